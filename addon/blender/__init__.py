@@ -1,0 +1,1 @@
+"""Blender data-blocks to arrays and back: imports bpy and core, never ui."""

@@ -1,0 +1,217 @@
+"""The scene as arrays: triangles, materials, lights, in world space and metres.
+
+Built by ``addon.blender.read_scene`` from a .blend, or by hand in tests. After the constructor nobody re-checks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+# pi stands in these two functions and nowhere else in the package's Python: a Lambertian surface of
+# radiance L sends out M = pi L [W/m^2].
+
+
+def exitance_from_radiance(radiance):
+    """M = pi L [W/m^2] of a Lambertian surface of radiance L [W/(m^2 sr)]."""
+    return np.pi * np.asarray(radiance)
+
+
+def radiance_from_exitance(exitance):
+    """L = M / pi [W/(m^2 sr)]; of an irradiance E, the E / pi that a bake stores."""
+    return np.asarray(exitance) / np.pi
+
+
+class SceneError(ValueError):
+    """A scene that cannot be baked; the message names the object, material or array."""
+
+
+@dataclass(frozen=True, slots=True)
+class Texture:
+    """An image looked up bilinearly at UVs that repeat; row 0 is v = 0.
+
+    Attributes
+    ----------
+    name : str
+    pixels : float32 (height, width, 3), linear Rec.709
+    """
+
+    name: str
+    pixels: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """A two-sided Lambertian surface.
+
+    Attributes
+    ----------
+    name : str
+    reflectance : (3,) diffuse reflectance rho [0..1]; multiplies the texture where there is one
+    reflectance_texture : Texture or None
+    radiance : (3,) self-emitted L_e [W/(m^2 sr)], both sides; multiplies the texture where there is one
+    radiance_texture : Texture or None
+    transmittance : (3,) share of the light that passes straight through [0..1]; (0, 0, 0) = opaque
+    """
+
+    name: str
+    reflectance: tuple[float, float, float] = (0.8, 0.8, 0.8)
+    reflectance_texture: Texture | None = None
+    radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    radiance_texture: Texture | None = None
+    transmittance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def transmits(self) -> bool:
+        return max(self.transmittance) > 0
+
+    @property
+    def emits(self) -> bool:
+        return max(self.radiance) > 0
+
+
+@dataclass(frozen=True, slots=True)
+class PointLight:
+    """A small sphere, or a point where the radius is 0. I = P / (4 pi).
+
+    ``cone_cosines`` makes it a spot: full inside cos >= cone_cosines[1], none outside cos <= cone_cosines[0], smoothstep
+    between; ``direction`` is where it looks. ``soft_falloff``: a disc that always faces the receiver, as Cycles does it.
+    """
+
+    name: str
+    position: tuple[float, float, float]  # [m]
+    intensity: tuple[float, float, float]  # I [W/sr]
+    radius: float = 0.0  # [m]
+    soft_falloff: bool = False
+    direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    cone_cosines: tuple[float, float] = (-2.0, -2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class AreaLight:
+    """A flat emitter that lights the side ``axis_u x axis_v`` looks to, and blocks no light.
+
+    The rectangle centre +- axis_u +- axis_v, or the ellipse with these half axes. ``spread`` < pi narrows the beam:
+    L (max(0, tan(s/2) - tan(a))) / (tan(s/2) - s/2), a the angle from the normal (Cycles' area light).
+    """
+
+    name: str
+    centre: tuple[float, float, float]  # [m]
+    axis_u: tuple[float, float, float]  # half side [m]
+    axis_v: tuple[float, float, float]  # half side [m]
+    radiance: tuple[float, float, float]  # L [W/(m^2 sr)]
+    is_ellipse: bool = False
+    spread: float = 3.141592653589793  # full angle [rad]
+
+
+@dataclass(frozen=True, slots=True)
+class SunLight:
+    """Light from far away. ``irradiance`` at normal incidence; ``angle`` is the full angle of its disc."""
+
+    name: str
+    direction: tuple[float, float, float]  # where the light travels to, unit
+    irradiance: tuple[float, float, float]  # [W/m^2]
+    angle: float = 0.0  # [rad]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneObject:
+    """One object (or instance) of the scene: a run of triangles.
+
+    Attributes
+    ----------
+    name : str
+    first, count : its triangles are ``triangles[first : first + count]``
+    is_target : whether receivers are placed on it
+    polygons : int32 (count,) which polygon of the object's mesh each triangle is part of: a polygon's triangles stay together in a chart
+    corners : int32 (count, 3) which face corner (Blender: loop) of the object's mesh each triangle corner is
+    lightmap_uvs : float32 (count, 3, 2) or None, the existing "Lightmap" UVs, for ``keep_uvs``
+    sharp_edges : bool (count, 3) edge k runs from triangle corner k to corner (k + 1) % 3; True = values are not shared across it
+    """
+
+    name: str
+    first: int
+    count: int
+    is_target: bool = True
+    polygons: np.ndarray | None = None
+    corners: np.ndarray | None = None
+    lightmap_uvs: np.ndarray | None = None
+    sharp_edges: np.ndarray | None = None
+
+    @property
+    def span(self) -> slice:
+        return slice(self.first, self.first + self.count)
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Triangles, materials and lights, in world space.
+
+    Attributes
+    ----------
+    vertices : float64 (V, 3) [m]
+    triangles : int32 (T, 3) counter-clockwise seen from the front; an object of negative scale is already flipped back
+    corner_normals : float32 (T, 3, 3) unit shading normals per corner; equal to the geometric normal where flat shaded
+    uvs : float32 (T, 3, 2) texture coordinates; 0 where there are none
+    triangle_materials : int32 (T,) index into ``materials``
+    objects : runs of triangles, in order, without gaps
+    materials : tuple of Material
+    lights : tuple of PointLight, AreaLight, SunLight
+    world_radiance : (3,) L of the constant world [W/(m^2 sr)]
+    warnings : one sentence each, naming the object or material
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    corner_normals: np.ndarray
+    uvs: np.ndarray
+    triangle_materials: np.ndarray
+    objects: tuple[SceneObject, ...]
+    materials: tuple[Material, ...]
+    lights: tuple = ()
+    world_radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    warnings: tuple[str, ...] = field(default=())
+
+    def __post_init__(self):
+        triangle_count = len(self.triangles)
+        _require_rows("vertices", self.vertices, np.float64, (len(self.vertices), 3))
+        _require_rows("triangles", self.triangles, np.int32, (triangle_count, 3))
+        _require_rows("corner_normals", self.corner_normals, np.float32, (triangle_count, 3, 3))
+        _require_rows("uvs", self.uvs, np.float32, (triangle_count, 3, 2))
+        _require_rows("triangle_materials", self.triangle_materials, np.int32, (triangle_count,))
+        _require_index("triangles", self.triangles, "vertex", len(self.vertices))
+        _require_index("triangle_materials", self.triangle_materials, "material", len(self.materials))
+        _require_finite("vertices", self.vertices)
+        _require_finite("corner_normals", self.corner_normals)
+        expected = 0
+        for obj in self.objects:
+            if obj.first != expected:
+                raise SceneError(f"object {obj.name} starts at triangle {obj.first}: expected {expected}")
+            expected += obj.count
+        if expected != triangle_count:
+            raise SceneError(f"objects cover {expected} of {triangle_count} triangles")
+
+    @property
+    def corners(self) -> np.ndarray:
+        """World positions of the triangles' corners, float64 (T, 3, 3) [m]."""
+        return self.vertices[self.triangles]
+
+
+def _require_rows(name, array, dtype, shape):
+    if not isinstance(array, np.ndarray) or array.dtype != dtype or array.shape != shape:
+        found = f"{array.dtype} {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+        raise SceneError(f"{name}: expected {np.dtype(dtype)} {shape}, got {found}")
+
+
+def _require_index(name, indices, noun, count):
+    bad = (indices < 0) | (indices >= count)
+    if bad.any():
+        row = int(np.argwhere(bad)[0][0])
+        raise SceneError(f"{name}[{row}] names a {noun} outside 0..{count - 1}")
+
+
+def _require_finite(name, array):
+    bad = ~np.isfinite(array).reshape(len(array), -1).all(axis=1)
+    if bad.any():
+        raise SceneError(f"{name}[{int(np.argmax(bad))}] is not finite")

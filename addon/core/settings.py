@@ -1,0 +1,80 @@
+"""What a bake is asked to do: one frozen, validated dataclass, no globals, no dicts of options."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+TARGETS = ("lightmap", "vertex")
+METHODS = ("auto", "hemicube", "monte-carlo")
+SOLVERS = ("auto", "direct", "progressive", "stochastic")
+
+
+class SettingsError(ValueError):
+    """A setting outside its range; the message names the setting, its value and the range."""
+
+
+class BakeCancelled(Exception):
+    """The progress callback asked to stop; nothing has been written."""
+
+
+@dataclass(frozen=True, slots=True)
+class BakeSettings:
+    """What a bake may spend and when it may stop.
+
+    Attributes
+    ----------
+    target : "lightmap" or "vertex"
+    method : how form factors are estimated; "auto" is Monte Carlo
+    solver : "auto" picks by the number of patches and says what it picked
+    error : target of the local relative RMS error of the irradiance [1]
+    time_limit : sampling stops after so many seconds, target reached or not [s]; None = no limit
+    texels : lightmap size as a number of texels, about
+    density : texels per metre; when given, it decides the size instead of ``texels`` [1/m]
+    keep_uvs : use the objects' existing "Lightmap" UV layers instead of unwrapping
+    patch_size : longest edge of a patch [m]; None = chosen from the scene
+    smooth_angle_deg : faces that meet at less share vertex colours, unless the edge is sharp
+    seed : same seed, same bytes
+    threads : 0 = all cores
+    """
+
+    target: str = "lightmap"
+    method: str = "auto"
+    solver: str = "auto"
+    error: float = 0.02
+    time_limit: float | None = None
+    texels: int = 1 << 20
+    density: float | None = None
+    keep_uvs: bool = False
+    patch_size: float | None = None
+    smooth_angle_deg: float = 30.0
+    seed: int = 0
+    threads: int = 0
+
+    def __post_init__(self):
+        _require_choice("target", self.target, TARGETS)
+        _require_choice("method", self.method, METHODS)
+        _require_choice("solver", self.solver, SOLVERS)
+        _require("error", self.error, 1e-4 <= self.error <= 1.0, "0.0001 ... 1")
+        _require("time_limit", self.time_limit, self.time_limit is None or self.time_limit > 0, "above 0 s")
+        _require("texels", self.texels, 64 <= self.texels <= 1 << 28, "64 ... 268435456")
+        _require("density", self.density, self.density is None or self.density > 0, "above 0 texels/m")
+        _require("patch_size", self.patch_size, self.patch_size is None or self.patch_size > 0, "above 0 m")
+        _require("smooth_angle_deg", self.smooth_angle_deg, 0 <= self.smooth_angle_deg <= 180, "0 ... 180 degrees")
+        _require("seed", self.seed, 0 <= self.seed < 1 << 32, "0 ... 4294967295")
+        _require("threads", self.threads, 0 <= self.threads <= 1024, "0 ... 1024")
+        if self.method == "hemicube" and self.solver == "stochastic":
+            raise SettingsError("solver stochastic shoots Monte Carlo rays: it cannot use method hemicube")
+
+    @property
+    def thread_count(self) -> int:
+        return self.threads or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
+def _require(name, value, holds, allowed):
+    if not holds:
+        raise SettingsError(f"{name} is {value}: allowed is {allowed}")
+
+
+def _require_choice(name, value, choices):
+    _require(name, value, value in choices, ", ".join(choices))

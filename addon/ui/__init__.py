@@ -1,0 +1,1 @@
+"""What a person touches inside Blender: properties, operators, panels."""
