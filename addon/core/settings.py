@@ -68,7 +68,8 @@ class BakeSettings:
 
     @property
     def thread_count(self) -> int:
-        return self.threads or len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        """Threads to run, at least 1."""
+        return self.threads or os.cpu_count() or 1
 
 
 def _require(name, value, holds, allowed):
