@@ -1,0 +1,83 @@
+# make bake   set everything up, bake the demo, say where the pictures are
+# make test   set everything up, run the tests
+# make check  linters, formatters, C tests under sanitizers
+# make zip    the Blender extension, one zip per platform, validated
+# make clean  remove what these made (.venv stays; `make distclean` removes it too)
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+OUT := out
+BUILD := build
+
+KERNEL := addon/core/_kernel.abi3.so
+KERNEL_SOURCES := $(wildcard native/src/*.c) native/python/module.c
+KERNEL_HEADERS := $(wildcard native/include/*.h native/src/*.h)
+C_FILES := $(KERNEL_SOURCES) $(KERNEL_HEADERS) $(wildcard tests/native/*.[ch])
+
+WARNINGS := -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Werror
+SANITIZE := -std=c11 -O1 -g -ffp-contract=off -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
+C_TESTS := $(patsubst tests/native/%.c,$(BUILD)/native/%,$(wildcard tests/native/test_*.c))
+
+.PHONY: bake test check lint native-tests kernel zip clean distclean
+.DELETE_ON_ERROR:
+
+# ---- set-up: each stamp is newer than what it was made from ----
+
+$(VENV)/.made:
+	@test -n "$(PYTHON)" || { echo "Python 3.11 not found: install python3.11, or say PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || \
+	    { echo "bpy 4.5 needs exactly Python 3.11 and $(PYTHON) is another: say PYTHON=/path/to/python3.11"; exit 1; }
+	@command -v $(CC) >/dev/null || { echo "no C compiler: install one (cc), or say CC=/path/to/compiler"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+# setuptools stays in the venv so that `make kernel` compiles without pip and without a network
+$(VENV)/.installed: $(VENV)/.made pyproject.toml
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "setuptools>=77,<85"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --editable ".[bpy,dev]"
+	@touch $@ $(KERNEL)
+
+$(KERNEL): $(KERNEL_SOURCES) $(KERNEL_HEADERS) | $(VENV)/.installed
+	$(BIN)/python -c "import setuptools; setuptools.setup()" --quiet build_ext --inplace --force
+	@touch $@
+
+kernel: $(VENV)/.installed $(KERNEL)
+
+# ---- the two commands ----
+
+test: kernel
+	$(BIN)/python -m pytest
+
+# ---- checks ----
+
+check: lint native-tests
+
+lint: $(VENV)/.installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(if $(C_FILES),$(BIN)/clang-format --dry-run -Werror $(C_FILES))
+	$(CC) -std=c11 -O3 -fsyntax-only -fvisibility=hidden $(WARNINGS) -DPy_LIMITED_API=0x030B0000 -Inative/include \
+	    -isystem $(shell $(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("include"))' 2>/dev/null) \
+	    $(KERNEL_SOURCES)
+
+# A C test is a program of plain asserts, linked with the whole kernel; it finds Embree by the environment.
+$(BUILD)/native/%: tests/native/%.c $(filter-out native/python/module.c,$(KERNEL_SOURCES)) $(KERNEL_HEADERS) $(wildcard tests/native/*.h)
+	@mkdir -p $(@D)
+	$(CC) $(SANITIZE) $(WARNINGS) -Inative/include -Inative/src $(filter %.c,$^) -o $@ -lm -ldl -lpthread
+
+# Leaks are not looked for: Embree and TBB keep their thread pools until the process ends.
+native-tests: $(C_TESTS) | $(VENV)/.installed
+	@embree=$$($(BIN)/python -c "$(FIND_EMBREE)"); \
+	for test in $(C_TESTS); do \
+	    echo "$$test"; ASAN_OPTIONS=detect_leaks=0 PATCHLIGHT_EMBREE="$$embree" $$test || exit 1; \
+	done
+FIND_EMBREE := import glob, importlib.util as u, pathlib as p; \
+    print(glob.glob(str(p.Path(u.find_spec('embreex').origin).parents[1] / 'embreex.libs' / 'libembree4*'))[0])
+
+clean:
+	rm -rf $(BUILD) $(OUT) dist *.egg-info $(KERNEL) .pytest_cache .ruff_cache .hypothesis
+	find addon tests native -name __pycache__ -prune -exec rm -rf {} +
+
+distclean: clean
+	rm -rf $(VENV) wheels
