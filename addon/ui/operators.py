@@ -1,0 +1,217 @@
+"""The Bake button: reads the scene, bakes on a thread while Blender stays alive, writes the result at the end."""
+
+from __future__ import annotations
+
+import time
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..core.settings import BakeCancelled, SettingsError
+from .job import BakeJob
+
+SECONDS_BETWEEN_POLLS = 0.1
+# While a bake runs these still reach Blender, so that one can look around; nothing that changes the scene does.
+PASSED_ON = {
+    *("MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM"),
+    *("MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "TIMER", "TIMER_REPORT", "TIMER_REGION", "WINDOW_DEACTIVATE", "NDOF_MOTION"),
+}
+STAGES_OF_A_BAKE = ("read", "texels", "solve", "gather", "write")
+
+# The one bake that runs in this Blender, or None.
+_running: PATCHLIGHT_OT_bake | None = None
+
+
+class PATCHLIGHT_OT_bake(bpy.types.Operator):
+    """Bake the diffuse light of the scene. Esc cancels and leaves everything as it was"""
+
+    bl_idname = "patchlight.bake"
+    bl_label = "Bake"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context):
+        if _running is not None:
+            cls.poll_message_set("A bake is running already")
+            return False
+        if context.mode != "OBJECT":
+            cls.poll_message_set("Switch to Object Mode first")
+            return False
+        return True
+
+    def invoke(self, context, _event):
+        """Start the thread and go modal; in background, where no events come, bake at once."""
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        if not self._prepare(context):
+            return {"CANCELLED"}
+        self._job.start()
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(SECONDS_BETWEEN_POLLS, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def execute(self, context):
+        """Bake and come back when it is done."""
+        if not self._prepare(context):
+            return {"CANCELLED"}
+        self._job.run()
+        return self._end(context)
+
+    def modal(self, context, event):
+        if event.type == "ESC" and event.value == "PRESS":
+            self._job.cancel()
+        if event.type == "TIMER":
+            if not self._job.is_running:
+                return self._end(context)
+            self._show(context)
+        return {"PASS_THROUGH"} if event.type in PASSED_ON else {"RUNNING_MODAL"}
+
+    def cancel(self, _context):
+        """Blender is closing this window or loading a file."""
+        self.abandon()
+
+    def _prepare(self, context):
+        """Read the scene and make the job; False after an error, which is reported."""
+        global _running
+        from ..blender import bake_scene
+        from ..core.bake import bake
+
+        self._timer, self._is_abandoned = None, False
+        began = time.perf_counter()
+        try:
+            scene = context.scene
+            metres_per_unit = scene.unit_settings.scale_length
+            settings = scene.patchlight.to_settings(metres_per_unit)
+            subdivide = scene.patchlight.subdivide_metres(metres_per_unit)
+            self._prepared = bake_scene.prepare(scene, settings, _names_to_bake(context), subdivide)
+        except _expected_errors() as error:
+            self.report({"ERROR"}, _sentence(error))
+            return False
+        self._read_seconds = time.perf_counter() - began
+        self._job = BakeJob(bake, self._prepared.scene, settings)
+        _running = self
+        state = context.window_manager.patchlight
+        state.is_baking, state.progress, state.stage = True, 0.0, "start"
+        return True
+
+    def _end(self, context):
+        """Write the result, or discard it, and tell how it went."""
+        from ..blender import bake_scene
+
+        self._leave(context)
+        if self._is_abandoned:
+            return {"CANCELLED"}
+        error = self._job.error
+        if error is None:
+            try:
+                began = time.perf_counter()
+                bake_scene.write(self._prepared, self._job.result)
+                self._tell(context, time.perf_counter() - began)
+                return {"FINISHED"}
+            except _expected_errors() as failure:
+                error = failure
+        bake_scene.discard(self._prepared)
+        if isinstance(error, BakeCancelled):
+            self.report({"INFO"}, "Bake cancelled, nothing changed")
+        elif isinstance(error, _expected_errors()):
+            self.report({"ERROR"}, _sentence(error))
+        else:
+            raise error
+        return {"CANCELLED"}
+
+    def _tell(self, context, write_seconds):
+        report = self._job.result.report
+        stages = {**report.seconds, "read": self._read_seconds, "write": write_seconds}
+        seconds = sum(stages.get(stage, 0.0) for stage in STAGES_OF_A_BAKE)
+        for warning in report.warnings:
+            self.report({"WARNING"}, warning)
+        self.report({"INFO"}, f"Baked in {seconds:.1f} s, estimated error {report.estimated_error:.3f}")
+        state = context.window_manager.patchlight
+        state.has_result = True
+        state.result_seconds, state.result_error = seconds, report.estimated_error
+        state.warning_count = len(report.warnings)
+
+    def _show(self, context):
+        state = context.window_manager.patchlight
+        state.progress = min(max(self._job.fraction, 0.0), 1.0)
+        state.stage = "cancelling" if self._job.is_cancelled else self._job.stage
+        context.workspace.status_text_set(f"Patchlight: {state.stage} {state.progress:.0%}   (Esc cancels)")
+        _redraw_sidebars(context.window_manager)
+
+    def _leave(self, context):
+        """Give back the timer, the status bar and the place of the one running bake."""
+        global _running
+        _running = None
+        state = context.window_manager.patchlight
+        state.is_baking = False
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+            context.workspace.status_text_set(None)
+            _redraw_sidebars(context.window_manager)
+
+    def abandon(self):
+        """The scene under the bake is about to go: end the job and touch nothing of the scene again."""
+        global _running
+        from ..blender import bake_scene
+
+        if self._is_abandoned:
+            return
+        self._is_abandoned = True
+        _running = None
+        self._job.cancel()
+        self._job.wait()
+        bake_scene.discard(self._prepared)
+        bpy.context.window_manager.patchlight.is_baking = False
+
+
+@persistent
+def abandon_running(*_args):
+    """Called before another file is loaded and before an undo step: both take away what a running bake has read."""
+    if _running is not None:
+        _running.abandon()
+
+
+def add_handlers():
+    """End a running bake before anything that it could not survive."""
+    for handlers in _handlers_to_watch():
+        handlers.append(abandon_running)
+
+
+def remove_handlers():
+    """Stop watching; a bake that still runs is ended."""
+    abandon_running()
+    for handlers in _handlers_to_watch():
+        handlers.remove(abandon_running)
+
+
+def _handlers_to_watch():
+    return (bpy.app.handlers.load_pre, bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre)
+
+
+def _names_to_bake(context):
+    if not context.scene.patchlight.only_selected:
+        return None
+    return [ob.name for ob in context.selected_objects]
+
+
+def _expected_errors():
+    """Exceptions whose message is meant for a person; their modules import NumPy, so they are looked up late."""
+    from ..core.scene import SceneError
+
+    return (BakeCancelled, SettingsError, SceneError, OSError, MemoryError)
+
+
+def _sentence(error):
+    return "Not enough memory for this bake" if isinstance(error, MemoryError) else str(error)
+
+
+def _redraw_sidebars(manager):
+    for window in manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+CLASSES = (PATCHLIGHT_OT_bake,)
