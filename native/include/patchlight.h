@@ -1,0 +1,227 @@
+/*
+ * Patchlight's kernel: rays through a triangle scene, and what radiosity makes of them.
+ *
+ * SPDX-License-Identifier: GPL-3.0-or-later
+ *
+ * Conventions, everywhere in this header:
+ *   lengths are metres, world space, right handed; normals are unit length
+ *   flux densities (irradiance, radiosity) are W/m^2, linear RGB
+ *   vec3 arrays are packed, 3 numbers per element, row-major, not aliased
+ *   a surface has two sides with a light of their own: side 0 is the front, which sees the corners
+ *     counter-clockwise, side 1 the back; patch p's unknowns are 2 p and 2 p + 1
+ *   a function that can fail returns pl_status; outputs are the last parameters
+ *   the caller owns every array; what a `create` is given is copied; `destroy(NULL)` is legal
+ *   nothing here starts a thread or keeps global state: callers run disjoint ranges of one job in as
+ *     many threads as they like, and get the same bytes for every number of threads
+ */
+#ifndef PATCHLIGHT_H
+#define PATCHLIGHT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+typedef enum pl_status {
+    PL_OK = 0,
+    PL_CANCELLED = 1,
+    PL_ERR_MEMORY = -1,
+    PL_ERR_ARGUMENT = -2, /* an index out of range, a count of 0 where one is needed */
+    PL_ERR_EMBREE = -3    /* the library cannot be opened, or is not the one that was measured */
+} pl_status;
+
+/* One English sentence, never NULL. */
+const char *pl_status_text(pl_status status);
+
+/*
+ * Embree, opened at run time.
+ *
+ *   path  full path of the shared library that the embreex wheel ships
+ *
+ * PL_ERR_EMBREE: no such library, a function is missing, or its version or the layout of its ray
+ * structures is not the one declared here (4.4).
+ */
+typedef struct pl_embree pl_embree;
+pl_status pl_embree_open(const char *path, pl_embree **out_embree);
+void pl_embree_close(pl_embree *embree);
+
+/*
+ * A BVH over triangles, both sides visible.
+ *
+ *   embree         must outlive the scene
+ *   vertices       3 * vertex_count doubles; re-centred in double before they become float
+ *   triangles      3 * triangle_count indices
+ *   transmittance  3 * triangle_count floats: the share of light that passes straight through; a
+ *                  triangle with any above 0 occludes nothing and tints what passes. NULL = all opaque
+ *
+ * Triangles without an area are kept, so that indices stay, and never hit.
+ */
+typedef struct pl_scene pl_scene;
+pl_status pl_scene_create(const pl_embree *embree, const double *vertices, size_t vertex_count,
+                          const int32_t *triangles, size_t triangle_count,
+                          const float *transmittance, pl_scene **out_scene);
+void pl_scene_destroy(pl_scene *scene);
+
+/*
+ * The first opaque triangle along each ray.
+ *
+ *   origins, directions  3 * count; directions need not be unit
+ *   out_triangles        count indices, -1 where nothing is hit
+ *   out_hits             3 * count: u, v (weights of corners 1 and 2) and distance in units of the
+ *                        direction's length
+ */
+void pl_closest_hits(const pl_scene *scene, const double *origins, const float *directions,
+                     size_t count, int32_t *out_triangles, float *out_hits);
+
+/* 1 where an opaque triangle lies between the two points, ends excluded, else 0. */
+void pl_occluded(const pl_scene *scene, const double *from, const double *to, size_t count,
+                 uint8_t *out_occluded);
+
+/*
+ * How triangles are cut into patches: rows parallel to the longest edge, columns across each row that
+ * run towards the opposite corner, the apex. A row's columns have equal areas, a triangle's rows equal
+ * heights, so point -> patch and patch -> point are closed forms.
+ *
+ *   apexes         triangle_count: which corner (0..2) is the apex
+ *   first_rows     triangle_count + 1: triangle t has rows first_rows[t] .. first_rows[t + 1] - 1, row 0
+ *                  along the longest edge
+ *   first_patches  row_count + 1: row r has patches first_patches[r] .. first_patches[r + 1] - 1
+ */
+typedef struct pl_patches pl_patches;
+pl_status pl_patches_create(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
+                            const int32_t *first_patches, size_t row_count,
+                            pl_patches **out_patches);
+void pl_patches_destroy(pl_patches *patches);
+
+/*
+ * Points spread evenly over patches, randomised quasi-Monte Carlo.
+ *
+ *   first, count      the range of patches
+ *   samples           points on each patch
+ *   out_triangles     count * samples
+ *   out_barycentrics  3 * count * samples floats
+ */
+void pl_patch_points(const pl_patches *patches, size_t first, size_t count, uint32_t samples,
+                     uint32_t seed, int32_t *out_triangles, float *out_barycentrics);
+
+/*
+ * Form factors from some sides to all sides: the share of the power leaving a side that lands on each.
+ * A row sums to 1 less what escapes. Visibility is found by rays; transmitting triangles are ignored.
+ *
+ * Monte Carlo: cosine rays, stratified in position and direction together by a 4-D Owen-scrambled Sobol
+ * sequence (Burley 2020). Hemicube (Cohen & Greenberg 1985): delta form factors of a half cube's pixels,
+ * normalised to sum to 1 [their eqs. 12-13], from `positions` points spread over the patch, each
+ * hemicube turned about the normal by an angle of its own.
+ *
+ *   sides      count of them: 2 * patch + side
+ *   rays       per side, at least 1
+ *   resolution pixels along the top face, even, at least 2: 3 * resolution^2 rays per position
+ *   out_rows   count * 2 * patch_count floats
+ */
+pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *patches,
+                                      const int32_t *sides, size_t count, uint32_t rays,
+                                      uint32_t seed, float *out_rows);
+pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patches,
+                                   const int32_t *sides, size_t count, uint32_t resolution,
+                                   uint32_t positions, uint32_t seed, float *out_rows);
+
+/*
+ * Shoot flux along rays from sides to where they land (stochastic Jacobi, Bekaert 1999).
+ *
+ *   first_rays     2 * patch_count + 1: side s owns rays first_rays[s] .. first_rays[s + 1] - 1
+ *   first_samples  2 * patch_count: how far each side's own sequence has been used before
+ *   ray_flux       3 * 2 * patch_count: what one ray of a side carries, in fixed point: the caller scales
+ *                  so that all rays together stay below 2^64 in each channel
+ *   first, count   the range of rays
+ *   io_received    3 * 2 * patch_count: what has landed, added to atomically; integers, so that the sum
+ *                  does not depend on the order
+ *   io_escaped     3: what left the scene
+ */
+void pl_shoot(const pl_scene *scene, const pl_patches *patches, const uint64_t *first_rays,
+              const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count,
+              uint32_t seed, uint64_t *io_received, uint64_t *io_escaped);
+
+/*
+ * Where light is wanted.
+ *
+ *   positions  3 doubles each, on the triangle, or lifted off it where it stands for a smooth surface
+ *   normals    the shading normal: the cosine is measured from it
+ *   triangles  index of the triangle each lies on, 2 * triangle + side
+ *
+ * Rays leave from the triangle's plane, pushed off it by a few units in the last place, so that they
+ * cannot hit the face that they leave.
+ */
+typedef struct pl_receivers {
+    const double *positions;
+    const float *normals;
+    const int32_t *triangle_sides;
+} pl_receivers;
+
+/*
+ * Irradiance by gathering: the mean radiosity that cosine rays see (final gather).
+ *
+ *   radiosity      3 * 2 * patch_count, emission excluded where direct light is computed apart
+ *   sky_radiosity  3: pi * the radiance of what rays see that leave the scene
+ *   selected       count indices into the receivers; the sequence of a receiver hangs on its index only
+ *   replicates     independent randomisations, 1..PL_MAX_REPLICATES; their spread is the error estimate
+ *   first, count_rays  each replicate takes points first .. first + rays - 1 of its Sobol sequence;
+ *                  powers of two are best
+ *   io_sums        3 * replicates per selected receiver's index: sums of radiosity over rays, added to
+ */
+enum { PL_MAX_REPLICATES = 8 };
+typedef struct pl_gather_rays {
+    uint32_t replicates;
+    uint32_t first;
+    uint32_t count;
+    uint32_t seed;
+} pl_gather_rays;
+void pl_gather(const pl_scene *scene, const pl_patches *patches, const float *radiosity,
+               const float sky_radiosity[3], const pl_receivers *receivers, const uint32_t *selected,
+               size_t count, pl_gather_rays rays, float *io_sums);
+
+/*
+ * Emitters that direct light is sampled from.
+ *
+ * A row of `parameters` (PL_LIGHT_FLOATS floats) for each light, by kind:
+ *   POINT  position, intensity, radius, is_soft (1 = disc that faces the receiver), direction, cone cosines
+ *          outer and inner (-2, -2: no cone)
+ *   AREA   centre, radiance, axis u (half side), axis v (half side), is_ellipse, spread (full angle)
+ *   SUN    direction to the sun, irradiance, angular radius
+ *   MESH   centre, bounding radius, flux-like weight (sum of area * radiance) for choosing; first and
+ *          count of its emitting triangles
+ * Emitting triangles: corners (9 floats), radiance (3), scene triangle; a MESH light's triangles are
+ * chosen with the chances whose cumulative sums, from 0 to 1, are `cumulative`.
+ * Positions are relative to `centre`, which the scene was re-centred by: pl_scene_centre.
+ */
+enum { PL_LIGHT_POINT = 0, PL_LIGHT_AREA = 1, PL_LIGHT_SUN = 2, PL_LIGHT_MESH = 3 };
+enum { PL_LIGHT_FLOATS = 20 };
+typedef struct pl_lights {
+    const int32_t *kinds;
+    const float *parameters;
+    size_t count;
+    const float *triangle_corners;
+    const float *triangle_radiances;
+    const float *cumulative;
+    size_t triangle_count;
+} pl_lights;
+void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
+
+/*
+ * Direct irradiance from the lights: shadow rays, emitters chosen by what they would give unoccluded.
+ *
+ *   first, count   the range of receivers
+ *   samples        shadow rays for a receiver on which all light is partly hidden; a receiver that sees
+ *                  all or nothing of a light takes a quarter
+ *   out_irradiance 3 per receiver, at the receiver's index
+ *   out_variance   1 per receiver: variance of the irradiance's luminance, estimated
+ *   out_rays       shadow rays traced
+ */
+pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers,
+                    size_t first, size_t count, uint32_t samples, uint32_t seed,
+                    float *out_irradiance, float *out_variance, uint64_t *out_rays);
+
+/*
+ * Which texels of a lightmap are receivers, and of which point.
+ *
+ * TEXELS-SECTION (see texels.c)
+ */
+
+#endif

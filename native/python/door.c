@@ -1,0 +1,81 @@
+/* Arguments in, exceptions out. SPDX-License-Identifier: GPL-3.0-or-later */
+#include "door.h"
+
+#include <string.h>
+
+static const char *type_name(char format) {
+    switch (format) {
+    case 'f':
+        return "float32";
+    case 'd':
+        return "float64";
+    case 'i':
+        return "int32";
+    case 'I':
+        return "uint32";
+    case 'Q':
+        return "uint64";
+    default:
+        return "uint8";
+    }
+}
+
+/* NumPy spells 64-bit integers 'L' on some systems and 'Q' on others. */
+static bool has_format(const Py_buffer *view, char format) {
+    const char *found = view->format ? view->format : "B";
+    if (format == 'Q')
+        return (strcmp(found, "Q") == 0 || strcmp(found, "L") == 0) && view->itemsize == 8;
+    if (format == 'i' || format == 'I')
+        return view->itemsize == 4 && (found[0] == format || found[0] == (format == 'i' ? 'l' : 'L'));
+    return found[0] == format && found[1] == 0;
+}
+
+static bool get_array(PyObject *object, door_array *array) {
+    const int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (array->is_output ? PyBUF_WRITABLE : 0);
+    if (PyObject_GetBuffer(object, &array->view, flags) < 0) {
+        PyErr_Clear();
+        PyErr_Format(PyExc_TypeError, "%s: expected a contiguous%s %s array", array->name,
+                     array->is_output ? ", writable" : "", type_name(array->format));
+        return false;
+    }
+    const bool fits = has_format(&array->view, array->format) &&
+                      array->view.len % (array->view.itemsize * array->columns) == 0;
+    if (!fits || (array->rows >= 0 && (Py_ssize_t)door_rows(array) != array->rows)) {
+        PyErr_Format(PyExc_TypeError, "%s: expected %s, %zd a row%s", array->name,
+                     type_name(array->format), array->columns,
+                     array->rows >= 0 ? ", as many rows as the arrays before it imply" : "");
+        PyBuffer_Release(&array->view);
+        return false;
+    }
+    return true;
+}
+
+bool door_arrays(PyObject *const *objects, door_array *arrays, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        if (!get_array(objects[i], &arrays[i])) {
+            door_release(arrays, i);
+            return false;
+        }
+    }
+    return true;
+}
+
+void door_release(door_array *arrays, size_t count) {
+    for (size_t i = 0; i < count; ++i)
+        PyBuffer_Release(&arrays[i].view);
+}
+
+PyObject *door_result(pl_status status) {
+    switch (status) {
+    case PL_OK:
+        Py_RETURN_NONE;
+    case PL_ERR_MEMORY:
+        return PyErr_NoMemory();
+    case PL_ERR_EMBREE:
+        PyErr_SetString(PyExc_ImportError, pl_status_text(status));
+        return NULL;
+    default:
+        PyErr_SetString(PyExc_ValueError, pl_status_text(status));
+        return NULL;
+    }
+}

@@ -1,0 +1,34 @@
+/* What every function of the door needs: arguments as checked arrays, statuses as exceptions. SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef PATCHLIGHT_DOOR_H
+#define PATCHLIGHT_DOOR_H
+
+#define PY_SSIZE_T_CLEAN
+#include <Python.h>
+
+#include "patchlight.h"
+
+#include <stdbool.h>
+
+/*
+ * One array argument: its name for messages, its type as the buffer protocol spells it ('f' float32, 'd' float64,
+ * 'i' int32, 'I' uint32, 'Q' uint64, 'B' uint8), numbers per row, rows expected (-1: any), and whether it is written.
+ */
+typedef struct door_array {
+    const char *name;
+    char format;
+    Py_ssize_t columns, rows;
+    bool is_output;
+    Py_buffer view;
+} door_array;
+
+/* Fill `view` of each array from the objects in order; on failure an exception is set and nothing is held. */
+bool door_arrays(PyObject *const *objects, door_array *arrays, size_t count);
+void door_release(door_array *arrays, size_t count);
+static inline size_t door_rows(const door_array *array) {
+    return (size_t)(array->view.len / array->view.itemsize / array->columns);
+}
+
+/* NULL with the exception that the status means; None for PL_OK. */
+PyObject *door_result(pl_status status);
+
+#endif

@@ -1,0 +1,335 @@
+/*
+ * The door between Python and the kernel: arrays in, GIL off, status to exception. No maths, no allocation of
+ * results: addon/core/kernel.py does that. SPDX-License-Identifier: GPL-3.0-or-later
+ */
+#include "door.h"
+
+static const char EMBREE[] = "patchlight.embree", SCENE[] = "patchlight.scene",
+                  PATCHES[] = "patchlight.patches";
+
+/* A capsule keeps what it was made from alive by its context. */
+static void drop_parent(PyObject *capsule) { Py_XDECREF((PyObject *)PyCapsule_GetContext(capsule)); }
+
+static void destroy_embree(PyObject *capsule) { pl_embree_close(PyCapsule_GetPointer(capsule, EMBREE)); }
+
+static void destroy_scene(PyObject *capsule) {
+    pl_scene_destroy(PyCapsule_GetPointer(capsule, SCENE));
+    drop_parent(capsule);
+}
+
+static void destroy_patches(PyObject *capsule) { pl_patches_destroy(PyCapsule_GetPointer(capsule, PATCHES)); }
+
+static PyObject *open_embree(PyObject *self, PyObject *args) {
+    const char *path;
+    pl_embree *embree = NULL;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "s", &path))
+        return NULL;
+    const pl_status status = pl_embree_open(path, &embree);
+    return status == PL_OK ? PyCapsule_New(embree, EMBREE, destroy_embree) : door_result(status);
+}
+
+static PyObject *create_scene(PyObject *self, PyObject *args) {
+    PyObject *parent, *objects[3];
+    pl_scene *scene = NULL;
+    pl_status status;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOO", &parent, &objects[0], &objects[1], &objects[2]))
+        return NULL;
+    const pl_embree *embree = PyCapsule_GetPointer(parent, EMBREE);
+    door_array arrays[] = {{"vertices", 'd', 3, -1, false, {0}},
+                           {"triangles", 'i', 3, -1, false, {0}},
+                           {"transmittance", 'f', 3, -1, false, {0}}};
+    const size_t count = objects[2] == Py_None ? 2 : 3;
+    if (!embree || !door_arrays(objects, arrays, count))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    status = pl_scene_create(embree, arrays[0].view.buf, door_rows(&arrays[0]), arrays[1].view.buf,
+                             door_rows(&arrays[1]), count == 3 ? arrays[2].view.buf : NULL, &scene);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, count);
+    if (status != PL_OK)
+        return door_result(status);
+    PyObject *capsule = PyCapsule_New(scene, SCENE, destroy_scene);
+    if (capsule)
+        PyCapsule_SetContext(capsule, Py_NewRef(parent));
+    return capsule;
+}
+
+static PyObject *scene_centre(PyObject *self, PyObject *capsule) {
+    double centre[3];
+    (void)self;
+    const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
+    if (!scene)
+        return NULL;
+    pl_scene_centre(scene, centre);
+    return Py_BuildValue("(ddd)", centre[0], centre[1], centre[2]);
+}
+
+static PyObject *closest_hits(PyObject *self, PyObject *args) {
+    PyObject *capsule, *objects[4];
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOOO", &capsule, &objects[0], &objects[1], &objects[2], &objects[3]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
+    door_array arrays[] = {{"origins", 'd', 3, -1, false, {0}},
+                           {"directions", 'f', 3, -1, false, {0}},
+                           {"out_triangles", 'i', 1, -1, true, {0}},
+                           {"out_hits", 'f', 3, -1, true, {0}}};
+    if (!scene || !door_arrays(objects, arrays, 4))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_closest_hits(scene, arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]),
+                    arrays[2].view.buf, arrays[3].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 4);
+    Py_RETURN_NONE;
+}
+
+static PyObject *occluded(PyObject *self, PyObject *args) {
+    PyObject *capsule, *objects[3];
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOO", &capsule, &objects[0], &objects[1], &objects[2]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
+    door_array arrays[] = {{"points_from", 'd', 3, -1, false, {0}},
+                           {"points_to", 'd', 3, -1, false, {0}},
+                           {"out_occluded", 'B', 1, -1, true, {0}}};
+    if (!scene || !door_arrays(objects, arrays, 3))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_occluded(scene, arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 3);
+    Py_RETURN_NONE;
+}
+
+static PyObject *create_patches(PyObject *self, PyObject *args) {
+    PyObject *objects[3];
+    pl_patches *patches = NULL;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOO", &objects[0], &objects[1], &objects[2]))
+        return NULL;
+    door_array arrays[] = {{"apexes", 'B', 1, -1, false, {0}},
+                           {"first_rows", 'i', 1, -1, false, {0}},
+                           {"first_patches", 'i', 1, -1, false, {0}}};
+    if (!door_arrays(objects, arrays, 3))
+        return NULL;
+    pl_status status = PL_ERR_ARGUMENT;
+    if (door_rows(&arrays[1]) == door_rows(&arrays[0]) + 1 && door_rows(&arrays[2]) > 0)
+        status = pl_patches_create(arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]),
+                                   arrays[2].view.buf, door_rows(&arrays[2]) - 1, &patches);
+    door_release(arrays, 3);
+    return status == PL_OK ? PyCapsule_New(patches, PATCHES, destroy_patches) : door_result(status);
+}
+
+static PyObject *patch_points(PyObject *self, PyObject *args) {
+    PyObject *capsule, *objects[2];
+    Py_ssize_t first, count;
+    unsigned samples, seed;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OnnIIOO", &capsule, &first, &count, &samples, &seed, &objects[0],
+                          &objects[1]))
+        return NULL;
+    const pl_patches *patches = PyCapsule_GetPointer(capsule, PATCHES);
+    door_array arrays[] = {{"out_triangles", 'i', 1, count * (Py_ssize_t)samples, true, {0}},
+                           {"out_barycentrics", 'f', 3, count * (Py_ssize_t)samples, true, {0}}};
+    if (!patches || !door_arrays(objects, arrays, 2))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_patch_points(patches, (size_t)first, (size_t)count, samples, seed, arrays[0].view.buf,
+                    arrays[1].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 2);
+    Py_RETURN_NONE;
+}
+
+static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
+    PyObject *capsules[2], *objects[2];
+    unsigned rays, seed;
+    pl_status status;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOIIO", &capsules[0], &capsules[1], &objects[0], &rays, &seed,
+                          &objects[1]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
+    if (!patches || !door_arrays(objects, arrays, 2))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    status = pl_form_factors_monte_carlo(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]), rays,
+                                         seed, arrays[1].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 2);
+    return door_result(status);
+}
+
+static PyObject *form_factors_hemicube(PyObject *self, PyObject *args) {
+    PyObject *capsules[2], *objects[2];
+    unsigned resolution, positions, seed;
+    pl_status status;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOIIIO", &capsules[0], &capsules[1], &objects[0], &resolution,
+                          &positions, &seed, &objects[1]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
+    if (!patches || !door_arrays(objects, arrays, 2))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    status = pl_form_factors_hemicube(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]),
+                                      resolution, positions, seed, arrays[1].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 2);
+    return door_result(status);
+}
+
+static PyObject *shoot(PyObject *self, PyObject *args) {
+    PyObject *capsules[2], *objects[5];
+    unsigned long long first, count;
+    unsigned seed;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOOOKKIOO", &capsules[0], &capsules[1], &objects[0], &objects[1],
+                          &objects[2], &first, &count, &seed, &objects[3], &objects[4]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    door_array arrays[] = {{"first_rays", 'Q', 1, -1, false, {0}},
+                           {"first_samples", 'I', 1, -1, false, {0}},
+                           {"ray_flux", 'Q', 3, -1, false, {0}},
+                           {"io_received", 'Q', 3, -1, true, {0}},
+                           {"io_escaped", 'Q', 3, 1, true, {0}}};
+    if (!patches || !door_arrays(objects, arrays, 5))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_shoot(scene, patches, arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf, first, count, seed,
+             arrays[3].view.buf, arrays[4].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 5);
+    Py_RETURN_NONE;
+}
+
+static PyObject *gather(PyObject *self, PyObject *args) {
+    PyObject *capsules[2], *objects[7];
+    pl_gather_rays rays;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOOOOOOIIIIO", &capsules[0], &capsules[1], &objects[0], &objects[1],
+                          &objects[2], &objects[3], &objects[4], &objects[5], &rays.replicates, &rays.first,
+                          &rays.count, &rays.seed, &objects[6]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    door_array arrays[] = {{"radiosity", 'f', 3, -1, false, {0}},
+                           {"sky_radiosity", 'f', 3, 1, false, {0}},
+                           {"positions", 'd', 3, -1, false, {0}},
+                           {"normals", 'f', 3, -1, false, {0}},
+                           {"triangle_sides", 'i', 1, -1, false, {0}},
+                           {"selected", 'I', 1, -1, false, {0}},
+                           {"io_sums", 'f', 3, -1, true, {0}}};
+    if (!patches || !door_arrays(objects, arrays, 7))
+        return NULL;
+    const pl_receivers receivers = {arrays[2].view.buf, arrays[3].view.buf, arrays[4].view.buf};
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_gather(scene, patches, arrays[0].view.buf, arrays[1].view.buf, &receivers, arrays[5].view.buf,
+              door_rows(&arrays[5]), rays, arrays[6].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 7);
+    Py_RETURN_NONE;
+}
+
+static PyObject *direct(PyObject *self, PyObject *args) {
+    PyObject *capsule, *objects[10];
+    Py_ssize_t first, count;
+    unsigned samples, seed;
+    uint64_t rays = 0;
+    pl_status status;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOOOOOOOnnIIOO", &capsule, &objects[0], &objects[1], &objects[2],
+                          &objects[3], &objects[4], &objects[5], &objects[6], &objects[7], &first, &count,
+                          &samples, &seed, &objects[8], &objects[9]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
+    door_array arrays[] = {{"light_kinds", 'i', 1, -1, false, {0}},
+                           {"light_parameters", 'f', PL_LIGHT_FLOATS, -1, false, {0}},
+                           {"light_corners", 'f', 9, -1, false, {0}},
+                           {"light_radiances", 'f', 3, -1, false, {0}},
+                           {"light_cumulative", 'f', 1, -1, false, {0}},
+                           {"positions", 'd', 3, -1, false, {0}},
+                           {"normals", 'f', 3, -1, false, {0}},
+                           {"triangle_sides", 'i', 1, -1, false, {0}},
+                           {"out_irradiance", 'f', 3, -1, true, {0}},
+                           {"out_variance", 'f', 1, -1, true, {0}}};
+    if (!scene || !door_arrays(objects, arrays, 10))
+        return NULL;
+    const pl_lights lights = {arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]),
+                              arrays[2].view.buf, arrays[3].view.buf, arrays[4].view.buf,
+                              door_rows(&arrays[4])};
+    const pl_receivers receivers = {arrays[5].view.buf, arrays[6].view.buf, arrays[7].view.buf};
+
+    Py_BEGIN_ALLOW_THREADS
+    status = pl_direct(scene, &lights, &receivers, (size_t)first, (size_t)count, samples, seed,
+                       arrays[8].view.buf, arrays[9].view.buf, &rays);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 10);
+    return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
+}
+
+static PyMethodDef methods[] = {
+    {"open_embree", open_embree, METH_VARARGS, "open_embree(path) -> embree"},
+    {"create_scene", create_scene, METH_VARARGS,
+     "create_scene(embree, vertices, triangles, transmittance or None) -> scene"},
+    {"scene_centre", scene_centre, METH_O, "scene_centre(scene) -> (x, y, z)"},
+    {"closest_hits", closest_hits, METH_VARARGS,
+     "closest_hits(scene, origins, directions, out_triangles, out_hits)"},
+    {"occluded", occluded, METH_VARARGS, "occluded(scene, points_from, points_to, out_occluded)"},
+    {"create_patches", create_patches, METH_VARARGS,
+     "create_patches(apexes, first_rows, first_patches) -> patches"},
+    {"patch_points", patch_points, METH_VARARGS,
+     "patch_points(patches, first, count, samples, seed, out_triangles, out_barycentrics)"},
+    {"form_factors_monte_carlo", form_factors_monte_carlo, METH_VARARGS,
+     "form_factors_monte_carlo(scene, patches, sides, rays, seed, out_rows)"},
+    {"form_factors_hemicube", form_factors_hemicube, METH_VARARGS,
+     "form_factors_hemicube(scene, patches, sides, resolution, positions, seed, out_rows)"},
+    {"shoot", shoot, METH_VARARGS,
+     "shoot(scene, patches, first_rays, first_samples, ray_flux, first, count, seed, io_received, "
+     "io_escaped)"},
+    {"gather", gather, METH_VARARGS,
+     "gather(scene, patches, radiosity, sky_radiosity, positions, normals, triangle_sides, selected, "
+     "replicates, first, count, seed, io_sums)"},
+    {"direct", direct, METH_VARARGS,
+     "direct(scene, kinds, parameters, corners, radiances, cumulative, positions, normals, "
+     "triangle_sides, first, count, samples, seed, out_irradiance, out_variance) -> rays"},
+    {NULL, NULL, 0, NULL},
+};
+
+static PyModuleDef_Slot slots[] = {{0, NULL}};
+
+static PyModuleDef definition = {
+    .m_base = PyModuleDef_HEAD_INIT,
+    .m_name = "_kernel",
+    .m_doc = "The door to Patchlight's kernel; use addon.core.kernel.",
+    .m_methods = methods,
+    .m_slots = slots,
+};
+
+PyMODINIT_FUNC PyInit__kernel(void);
+PyMODINIT_FUNC PyInit__kernel(void) { return PyModuleDef_Init(&definition); }

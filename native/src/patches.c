@@ -1,0 +1,112 @@
+/* How triangles are cut into patches. SPDX-License-Identifier: GPL-3.0-or-later */
+#include "patches.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static bool is_rising(const int32_t *offsets, size_t count) {
+    for (size_t i = 0; i < count; ++i)
+        if (offsets[i + 1] <= offsets[i])
+            return false;
+    return offsets[0] == 0;
+}
+
+static bool layout_is_valid(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
+                            const int32_t *first_patches, size_t row_count) {
+    for (size_t t = 0; t < triangle_count; ++t)
+        if (apexes[t] > 2)
+            return false;
+    return is_rising(first_rows, triangle_count) && (size_t)first_rows[triangle_count] == row_count &&
+           is_rising(first_patches, row_count);
+}
+
+static int32_t *copy_of(const int32_t *numbers, size_t count) {
+    int32_t *copy = malloc(sizeof *copy * count);
+    if (copy)
+        memcpy(copy, numbers, sizeof *copy * count);
+    return copy;
+}
+
+/* Which run each number belongs to: the inverse of offsets. */
+static int32_t *owners(const int32_t *offsets, size_t count) {
+    int32_t *owner = malloc(sizeof *owner * ((size_t)offsets[count] + 1));
+    for (size_t i = 0; owner && i < count; ++i)
+        for (int32_t k = offsets[i]; k < offsets[i + 1]; ++k)
+            owner[k] = (int32_t)i;
+    return owner;
+}
+
+pl_status pl_patches_create(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
+                            const int32_t *first_patches, size_t row_count,
+                            pl_patches **out_patches) {
+    if (!layout_is_valid(apexes, first_rows, triangle_count, first_patches, row_count))
+        return PL_ERR_ARGUMENT;
+    pl_patches *patches = calloc(1, sizeof *patches);
+    if (!patches)
+        return PL_ERR_MEMORY;
+    patches->triangle_count = triangle_count;
+    patches->row_count = row_count;
+    patches->patch_count = (size_t)first_patches[row_count];
+    patches->apexes = malloc(triangle_count + 1);
+    patches->first_rows = copy_of(first_rows, triangle_count + 1);
+    patches->first_patches = copy_of(first_patches, row_count + 1);
+    patches->patch_rows = owners(first_patches, row_count);
+    patches->row_triangles = owners(first_rows, triangle_count);
+    if (!patches->apexes || !patches->first_rows || !patches->first_patches || !patches->patch_rows ||
+        !patches->row_triangles) {
+        pl_patches_destroy(patches);
+        return PL_ERR_MEMORY;
+    }
+    memcpy(patches->apexes, apexes, triangle_count);
+    *out_patches = patches;
+    return PL_OK;
+}
+
+void pl_patches_destroy(pl_patches *patches) {
+    if (!patches)
+        return;
+    free(patches->apexes);
+    free(patches->first_rows);
+    free(patches->first_patches);
+    free(patches->patch_rows);
+    free(patches->row_triangles);
+    free(patches);
+}
+
+pl_barycentric point_in_patch(const pl_patches *patches, size_t patch, float x, float y) {
+    const int32_t row = patches->patch_rows[patch];
+    const int32_t triangle = patches->row_triangles[row];
+    const int32_t first_row = patches->first_rows[triangle];
+    const float rows = (float)(patches->first_rows[triangle + 1] - first_row);
+    const int32_t first = patches->first_patches[row];
+    const float columns = (float)(patches->first_patches[row + 1] - first);
+
+    /* the width of the triangle falls linearly towards the apex: area goes with the width's square */
+    const float wide = 1 - (float)(row - first_row) / rows;
+    const float narrow = fmaxf(0, 1 - (float)(row - first_row + 1) / rows);
+    const float width = sqrtf(wide * wide + x * (narrow * narrow - wide * wide));
+    const float across = ((float)((int32_t)patch - first) + y) / columns;
+
+    float weights[3];
+    const int apex = patches->apexes[triangle];
+    weights[apex] = 1 - width;
+    weights[(apex + 1) % 3] = width * (1 - across);
+    weights[(apex + 2) % 3] = width * across;
+    return (pl_barycentric){weights[1], weights[2]};
+}
+
+void pl_patch_points(const pl_patches *patches, size_t first, size_t count, uint32_t samples,
+                     uint32_t seed, int32_t *out_triangles, float *out_barycentrics) {
+    for (size_t i = 0; i < count; ++i) {
+        const uint32_t patch_seed = hash_pair(seed, (uint32_t)(first + i));
+        for (uint32_t k = 0; k < samples; ++k) {
+            const pl_barycentric b = point_in_patch(patches, first + i, sobol(k, 0, patch_seed),
+                                                    sobol(k, 1, patch_seed));
+            const size_t at = i * samples + k;
+            out_triangles[at] = patch_triangle(patches, first + i);
+            out_barycentrics[3 * at] = 1 - b.weight_1 - b.weight_2;
+            out_barycentrics[3 * at + 1] = b.weight_1;
+            out_barycentrics[3 * at + 2] = b.weight_2;
+        }
+    }
+}

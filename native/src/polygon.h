@@ -1,0 +1,13 @@
+/* Lambert's formula. SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef PATCHLIGHT_POLYGON_H
+#define PATCHLIGHT_POLYGON_H
+
+#include "vec3.h"
+
+/*
+ * Form factor from a point with a normal to a polygon of 3 or 4 corners, unoccluded, whichever way the
+ * polygon faces: what lies below the horizon is clipped away.
+ */
+double point_to_polygon(vec3 point, vec3 normal, const vec3 *corners, int count);
+
+#endif

@@ -1,0 +1,32 @@
+/* A receiver as rays leave it. SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef PATCHLIGHT_RECEIVERS_H
+#define PATCHLIGHT_RECEIVERS_H
+
+#include "scene.h"
+
+typedef struct pl_receiver_frame {
+    int32_t triangle;
+    int side;
+    vec3 origin;    /* off the triangle's plane */
+    vec3 geometric; /* the plane's normal on the receiver's side */
+    vec3 shading;   /* where the cosine is measured from */
+    bool is_smooth;
+} pl_receiver_frame;
+
+static inline pl_receiver_frame receiver_frame(const pl_scene *scene, const pl_receivers *receivers,
+                                               size_t index) {
+    const double *p = receivers->positions + 3 * index;
+    pl_receiver_frame frame = {.triangle = receivers->triangle_sides[index] / 2,
+                               .side = receivers->triangle_sides[index] & 1};
+    const vec3 point = {(float)(p[0] - scene->centre[0]), (float)(p[1] - scene->centre[1]),
+                        (float)(p[2] - scene->centre[2])};
+    frame.geometric = vec3_scale(scene_normal(scene, frame.triangle), frame.side ? -1.0f : 1.0f);
+    frame.shading = vec3_from(receivers->normals + 3 * index);
+    frame.is_smooth = vec3_dot(frame.geometric, frame.shading) < 0.99999f;
+    if (!frame.is_smooth)
+        frame.shading = frame.geometric;
+    frame.origin = point_off_triangle(scene, frame.triangle, point, frame.geometric);
+    return frame;
+}
+
+#endif

@@ -1,0 +1,70 @@
+/* Rays through the scene. SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef PATCHLIGHT_SCENE_H
+#define PATCHLIGHT_SCENE_H
+
+#include "embree.h"
+#include "vec3.h"
+
+#include <stdbool.h>
+
+/* Triangles that share a BVH, and which of the scene's triangles each is (NULL: the same). */
+typedef struct pl_layer {
+    RTCScene bvh;
+    int32_t *triangles;
+} pl_layer;
+
+struct pl_scene {
+    const pl_embree *embree;
+    double centre[3];
+    float *vertices; /* re-centred */
+    int32_t *indices;
+    float *transmittance; /* NULL where all is opaque */
+    size_t vertex_count, triangle_count;
+    pl_layer opaque;
+    pl_layer clear; /* bvh NULL where all is opaque */
+};
+
+typedef struct pl_hit {
+    int32_t triangle; /* -1: nothing */
+    float u, v, distance;
+    bool is_back;
+} pl_hit;
+
+static inline vec3 scene_vertex(const pl_scene *scene, int32_t triangle, int corner) {
+    return vec3_from(scene->vertices + 3 * (size_t)scene->indices[3 * (size_t)triangle + (size_t)corner]);
+}
+
+static inline vec3 scene_normal(const pl_scene *scene, int32_t triangle) {
+    const vec3 a = scene_vertex(scene, triangle, 0);
+    return vec3_unit(vec3_cross(vec3_sub(scene_vertex(scene, triangle, 1), a),
+                                vec3_sub(scene_vertex(scene, triangle, 2), a)));
+}
+
+static inline vec3 scene_point(const pl_scene *scene, int32_t triangle, float weight_1, float weight_2) {
+    const vec3 a = scene_vertex(scene, triangle, 0);
+    const vec3 b = vec3_sub(scene_vertex(scene, triangle, 1), a);
+    const vec3 c = vec3_sub(scene_vertex(scene, triangle, 2), a);
+    return vec3_mul_add(b, weight_1, vec3_mul_add(c, weight_2, a));
+}
+
+/*
+ * A point of a triangle moved off its plane by more than the rounding error of its corners, never by a
+ * fixed distance: eight units in the last place of their largest coordinate. Rays that leave from here do
+ * not meet the face that they leave.
+ */
+static inline vec3 point_off_triangle(const pl_scene *scene, int32_t triangle, vec3 point, vec3 normal) {
+    float largest = 0;
+    for (int corner = 0; corner < 3; ++corner) {
+        const vec3 p = scene_vertex(scene, triangle, corner);
+        largest = fmaxf(largest, fmaxf(fabsf(p.x), fmaxf(fabsf(p.y), fabsf(p.z))));
+    }
+    return vec3_mul_add(normal, 9.5367431640625e-7f * largest, point);
+}
+
+pl_hit closest_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near);
+/* Opaque triangles strictly between origin and origin + direction. */
+bool is_occluded(const pl_scene *scene, vec3 origin, vec3 direction, float far);
+/* Multiply io_rgb by what the transmitting triangles up to `far` let through. */
+void transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, float io_rgb[3]);
+
+#endif

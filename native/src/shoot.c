@@ -1,0 +1,63 @@
+/*
+ * Stochastic Jacobi's step: local lines that carry flux (Bekaert 1999, ch. 6).
+ * SPDX-License-Identifier: GPL-3.0-or-later
+ */
+#include "patches.h"
+
+#include <string.h>
+
+/* Sums of integers do not depend on the order, so any number of threads gives the same bytes. */
+static void add_flux(uint64_t *io_rgb, const uint64_t *rgb) {
+    for (int k = 0; k < 3; ++k)
+        if (rgb[k])
+            __atomic_fetch_add(io_rgb + k, rgb[k], __ATOMIC_RELAXED);
+}
+
+/* What transmitting triangles let through of a ray's flux. */
+static void tint_flux(const pl_scene *scene, vec3 origin, vec3 direction, float far, uint64_t io_rgb[3]) {
+    float through[3] = {1, 1, 1};
+    transmit(scene, origin, direction, far, through);
+    for (int k = 0; k < 3; ++k)
+        io_rgb[k] = (uint64_t)((double)io_rgb[k] * (double)fminf(through[k], 1));
+}
+
+/* The side that owns ray `ray`: the last whose first ray is not after it. */
+static size_t owner_of_ray(const uint64_t *first_rays, size_t side_count, uint64_t ray) {
+    size_t low = 0, high = side_count;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (first_rays[middle] <= ray)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+void pl_shoot(const pl_scene *scene, const pl_patches *patches, const uint64_t *first_rays,
+              const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count,
+              uint32_t seed, uint64_t *io_received, uint64_t *io_escaped) {
+    const size_t side_count = 2 * patches->patch_count;
+    size_t side = count ? owner_of_ray(first_rays, side_count, first) : 0;
+    pl_side_frame frame = side_frame(scene, patches, side);
+
+    for (uint64_t ray = first; ray < first + count; ++ray) {
+        if (ray >= first_rays[side + 1]) {
+            side = owner_of_ray(first_rays, side_count, ray);
+            frame = side_frame(scene, patches, side);
+        }
+        const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
+        const uint32_t k = first_samples[side] + (uint32_t)(ray - first_rays[side]);
+        const vec3 origin = side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed),
+                                        sobol(k, 1, side_seed));
+        const vec3 direction = cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), frame.u,
+                                                frame.v, frame.normal);
+
+        const pl_hit hit = closest_hit(scene, origin, direction, 0);
+        uint64_t flux[3];
+        memcpy(flux, ray_flux + 3 * side, sizeof flux);
+        if (scene->clear.bvh)
+            tint_flux(scene, origin, direction, hit.distance, flux);
+        add_flux(hit.triangle < 0 ? io_escaped : io_received + 3 * hit_side(patches, &hit), flux);
+    }
+}
