@@ -1,0 +1,152 @@
+"""The only door to the native kernel: allocates outputs, states shapes, runs ranges on all cores."""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+import pathlib
+import sys
+
+import numpy as np
+
+from .scene import Scene
+from .workers import Workers
+
+try:
+    from . import _kernel
+except ImportError as error:  # a source tree that has not been built, or a zip for another platform
+    raise ImportError(
+        f"Patchlight's native kernel cannot be loaded ({error}): install the zip of your platform, or run `make`"
+    ) from error
+
+LIBRARY_PATTERNS = {
+    "linux": ("../embreex.libs/libembree4*.so*",),
+    "win32": ("../embreex.libs/embree4*.dll", "embree4*.dll"),
+    "darwin": (".dylibs/libembree4*.dylib",),
+}
+
+
+@functools.cache
+def embree():
+    """Embree of the installed embreex wheel, opened once in a process; found by pattern, its name carries a hash."""
+    spec = importlib.util.find_spec("embreex")
+    if spec is None or not spec.origin:
+        raise ImportError("the package embreex is missing, which brings Embree: pip install embreex==4.4.0.post1")
+    folder = pathlib.Path(spec.origin).parent
+    for pattern in LIBRARY_PATTERNS.get(sys.platform, ()):
+        head, _, name = pattern.rpartition("/")
+        for path in sorted((folder / head).glob(name)):
+            return _kernel.open_embree(str(path.resolve()))
+    raise ImportError(f"no Embree 4 library stands beside {folder}: pip install embreex==4.4.0.post1")
+
+
+class KernelScene:
+    """The scene's BVH, with its patches once they are set.
+
+    Attributes
+    ----------
+    centre : float64 (3,) what positions are relative to inside the kernel [m]
+    """
+
+    def __init__(self, scene: Scene, workers: Workers):
+        transmittances = np.array([m.transmittance for m in scene.materials], np.float32).reshape(-1, 3)
+        clear = transmittances[scene.triangle_materials] if transmittances.any() else None
+        self.workers = workers
+        self._scene = _kernel.create_scene(embree(), scene.vertices, scene.triangles, clear)
+        self._patches = None
+        self.centre = np.array(_kernel.scene_centre(self._scene))
+        self.side_count = 0
+
+    def closest_hits(self, origins, directions):
+        """First opaque triangle along rays (N, 3): indices int32 (N,), -1 for none, and (u, v, distance) float32 (N, 3)."""
+        triangles, hits = np.empty(len(origins), np.int32), np.empty((len(origins), 3), np.float32)
+        _kernel.closest_hits(self._scene, _rows(origins, np.float64), _rows(directions, np.float32), triangles, hits)
+        return triangles, hits
+
+    def occluded(self, points_from, points_to):
+        """Whether an opaque triangle lies between points (N, 3): bool (N,)."""
+        out = np.empty(len(points_from), np.uint8)
+        _kernel.occluded(self._scene, _rows(points_from, np.float64), _rows(points_to, np.float64), out)
+        return out.astype(bool)
+
+    def set_patches(self, apexes, first_rows, first_patches) -> None:
+        """Cut the triangles into patches (layout: native/include/patchlight.h)."""
+        self._patches = _kernel.create_patches(apexes, first_rows, first_patches)
+        self.side_count = 2 * int(first_patches[-1])
+
+    def patch_points(self, first, count, samples, seed):
+        """Even points on patches: triangles int32 (count * samples,), barycentrics float32 (count * samples, 3)."""
+        triangles = np.empty(count * samples, np.int32)
+        barycentrics = np.empty((count * samples, 3), np.float32)
+        _kernel.patch_points(self._patches, first, count, samples, seed, triangles, barycentrics)
+        return triangles, barycentrics
+
+    def form_factors_monte_carlo(self, sides, rays, seed):
+        """Rows of form factors, float32 (len(sides), side_count), by cosine rays."""
+
+        def rows(part, out):
+            _kernel.form_factors_monte_carlo(self._scene, self._patches, part, rays, seed, out)
+
+        return self._form_factor_rows(sides, rows)
+
+    def form_factors_hemicube(self, sides, resolution, positions, seed):
+        """Rows of form factors, float32 (len(sides), side_count), by hemicubes."""
+
+        def rows(part, out):
+            _kernel.form_factors_hemicube(self._scene, self._patches, part, resolution, positions, seed, out)
+
+        return self._form_factor_rows(sides, rows)
+
+    def _form_factor_rows(self, sides, rows):
+        sides = _rows(sides, np.int32)
+        out = np.empty((len(sides), self.side_count), np.float32)
+        self.workers.each_range(len(sides), 8, lambda start, stop: rows(sides[start:stop], out[start:stop]))
+        return out
+
+    def shoot(self, first_rays, first_samples, ray_flux, seed):
+        """Shoot fixed-point flux along each side's rays: uint64 received (side_count, 3) and escaped (3,)."""
+        received, escaped = np.zeros((self.side_count, 3), np.uint64), np.zeros((1, 3), np.uint64)
+
+        def call(start, stop):
+            _kernel.shoot(
+                self._scene, self._patches, first_rays, first_samples, ray_flux, start, stop - start, seed, received,
+                escaped,
+            )  # fmt: skip
+
+        self.workers.each_range(int(first_rays[-1]), 1 << 16, call)
+        return received, escaped[0]
+
+    def gather(self, radiosity, sky_radiosity, receivers, selected, replicates, first, count, seed, io_sums, on_step):
+        """Add the radiosity that each selected receiver's rays see to io_sums, float32 (N, replicates, 3)."""
+        sky = _rows(sky_radiosity, np.float32).reshape(1, 3)
+        radiosity = _rows(radiosity, np.float32)
+
+        def call(start, stop):
+            _kernel.gather(
+                self._scene, self._patches, radiosity, sky, receivers.positions, receivers.normals,
+                receivers.triangle_sides, selected[start:stop], replicates, first, count, seed, io_sums,
+            )  # fmt: skip
+
+        size = max(64, min(4096, (1 << 17) // (replicates * count)))
+        self.workers.each_range(len(selected), size, call, on_step)
+
+    def direct(self, emitters, receivers, samples, seed, on_step=None):
+        """Direct irradiance float32 (N, 3) [W/m^2], variance of its luminance float32 (N,), shadow rays traced."""
+        count = len(receivers)
+        irradiance, variance = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+
+        def call(start, stop):
+            return _kernel.direct(
+                self._scene, emitters.kinds, emitters.parameters, emitters.corners, emitters.radiances,
+                emitters.cumulative, receivers.positions, receivers.normals, receivers.triangle_sides, start,
+                stop - start, samples, seed, irradiance, variance,
+            )  # fmt: skip
+
+        if not len(emitters.kinds):
+            return irradiance, variance, 0
+        rays = self.workers.each_range(count, 2048, call, on_step)
+        return irradiance, variance, sum(rays)
+
+
+def _rows(array, dtype):
+    return np.ascontiguousarray(array, dtype)

@@ -1,0 +1,71 @@
+"""What a bake says of itself: time, rays, error, energy, and every warning, ready for JSON."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+
+@dataclass(frozen=True, slots=True)
+class Energy:
+    """Flux balance of the solve [W], summed over the channels: shot = absorbed + escaped + unshot.
+
+    ``shot`` is the direct light that surfaces reflect: what the solver starts from.
+    """
+
+    shot: float = 0.0
+    absorbed: float = 0.0
+    escaped: float = 0.0
+    unshot: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The report of one bake.
+
+    Attributes
+    ----------
+    seconds : by stage
+    rays : by stage
+    patches, receivers : counts; a patch has two sides, an unknown each
+    method, solver : what ran, after "auto" has chosen; ``choice`` says why
+    residuals : the solver's residual after each step, relative to the first
+    estimated_error : local relative RMS error of the irradiance, sampling only (``error_covers`` says so)
+    target_error : what was asked for
+    target_reached : False when the time limit came first
+    energy : the solver's flux balance
+    warnings : one sentence each, with the object or material it names
+    """
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    rays: dict[str, int] = field(default_factory=dict)
+    triangles: int = 0
+    patches: int = 0
+    receivers: int = 0
+    lightmap_size: tuple[int, int] | None = None
+    method: str = ""
+    solver: str = ""
+    choice: str = ""
+    residuals: tuple[float, ...] = ()
+    estimated_error: float = 0.0
+    error_covers: str = "sampling of direct and gathered light, at the receivers"
+    target_error: float = 0.0
+    target_reached: bool = True
+    energy: Energy = field(default_factory=Energy)
+    warnings: tuple[str, ...] = ()
+
+    def with_stages(self, seconds: dict[str, float]) -> Report:
+        """A copy with further stages' seconds."""
+        return replace(self, seconds={**self.seconds, **seconds})
+
+    def with_warnings(self, warnings: tuple[str, ...]) -> Report:
+        """A copy with further warnings."""
+        return replace(self, warnings=(*self.warnings, *warnings))
+
+    def as_dict(self) -> dict:
+        """Plain numbers, strings, lists and dicts."""
+        fields = {name: getattr(self, name) for name in self.__slots__}
+        fields["energy"] = {name: getattr(self.energy, name) for name in Energy.__slots__}
+        fields["residuals"] = list(self.residuals)
+        fields["warnings"] = list(self.warnings)
+        fields["lightmap_size"] = list(self.lightmap_size) if self.lightmap_size else None
+        return fields
