@@ -1,0 +1,82 @@
+"""Blender images -> linear textures, each read once."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.scene import Texture
+from .shader_nodes import Unreadable
+
+# Bounced light does not see texels finer than this; an 8k texture would cost a gigabyte.
+LONGEST_SIDE = 2048
+
+LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "scene_linear"}
+
+
+class Images:
+    """The textures of one scene; images that several materials use are shared."""
+
+    def __init__(self, warn):
+        self._textures = {}
+        self._warn = warn
+
+    def texture(self, image) -> Texture:
+        """The image as linear Rec.709 pixels; Unreadable where it has none."""
+        key = image.original.as_pointer()
+        if key not in self._textures:
+            self._textures[key] = Texture(image.name, linear_pixels(image, self._warn))
+        return self._textures[key]
+
+
+def linear_pixels(image, warn) -> np.ndarray:
+    """Pixels as float32 (height, width, 3), linear Rec.709, row 0 at the bottom; alpha is ignored."""
+    width, height = image.size
+    if not width or not height:
+        raise Unreadable(f"image '{image.name}', which cannot be loaded")
+    if image.source in {"TILED", "MOVIE", "SEQUENCE"}:
+        warn(f"image '{image.name}': only one picture of its {image.source.lower()} source is read")
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = _rgb(pixels.reshape(height, width, image.channels))
+    if not image.is_float:
+        space = image.colorspace_settings.name
+        if space not in LINEAR_SPACES:
+            pixels = _linear_from_srgb_bytes(pixels)
+            if space != "sRGB":
+                warn(f"image '{image.name}': colour space {space} is read as sRGB")
+    return _shrunk(np.nan_to_num(pixels, posinf=0.0, neginf=0.0))
+
+
+def mean_colour(pixels) -> tuple[float, float, float]:
+    """Mean over a texture's texels."""
+    return tuple(float(c) for c in pixels.mean(axis=(0, 1), dtype=np.float64))
+
+
+def equirectangular_mean(pixels) -> tuple[float, float, float]:
+    """Mean over the sphere of directions: rows near the poles cover less of it."""
+    latitude = (np.arange(len(pixels)) + 0.5) / len(pixels) * np.pi - np.pi / 2
+    rows = pixels.mean(axis=1, dtype=np.float64)
+    return tuple(float(c) for c in np.average(rows, axis=0, weights=np.cos(latitude)))
+
+
+def _rgb(pixels):
+    channels = pixels.shape[2]
+    return pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
+
+
+def _linear_from_srgb_bytes(pixels):
+    # Blender hands bytes out as value / 255, still encoded: 256 different values, one table.
+    encoded = np.arange(256) / 255.0
+    table = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return table[np.clip(np.rint(pixels * 255), 0, 255).astype(np.uint8)]
+
+
+def _shrunk(pixels):
+    """Box-filtered by a whole factor until no side is longer than LONGEST_SIDE."""
+    factor = -(-max(pixels.shape[:2]) // LONGEST_SIDE)
+    if factor == 1:
+        return np.ascontiguousarray(pixels)
+    height, width = (max(side // factor, 1) for side in pixels.shape[:2])
+    across, down = min(factor, pixels.shape[1]), min(factor, pixels.shape[0])
+    blocks = pixels[: height * down, : width * across].reshape(height, down, width, across, 3)
+    return np.ascontiguousarray(blocks.mean(axis=(1, 3), dtype=np.float32))

@@ -1,0 +1,132 @@
+"""Lamps -> core lights, with Cycles' radiometry (each formula measured against Cycles bakes)."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+
+import numpy as np
+
+from ..core.scene import AreaLight, PointLight, SunLight
+from .shader_nodes import Unreadable, constant, surface_shader
+
+# A hard-edged cone is a very narrow soft one: the smoothstep over it stays finite.
+NARROWEST_CONE_EDGE = 1e-6
+
+
+def read_lights(depsgraph, visibility, warn) -> tuple:
+    """Every lamp that a render shows and that shines, instances included."""
+    lights = []
+    for instance in depsgraph.object_instances:
+        if instance.object.type != "LIGHT" or not visibility.shows(instance):
+            continue
+        lamp, name = instance.object.data, instance.object.name
+        power = _power(lamp, name, warn)
+        if max(power) <= 0:
+            continue
+        matrix = np.array(instance.matrix_world, np.float64)
+        if not np.isfinite(matrix).all():
+            warn(f"light '{name}' has a transform that is not finite: it is left out")
+            continue
+        lights += READERS[lamp.type](lamp, name, matrix, power, warn)
+    return tuple(lights)
+
+
+def _power(lamp, name, warn):
+    """P = energy x colour x 2^exposure x what its nodes say, per channel; [W], of a sun [W/m^2]."""
+    power = np.array(lamp.color[:], float) * lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0)
+    if getattr(lamp, "use_temperature", False):
+        power *= np.array(lamp.temperature_color[:])
+    if lamp.use_nodes and lamp.node_tree is not None:
+        power = power * _node_factor(lamp, name, warn)
+    return np.maximum(power, 0.0)
+
+
+def _node_factor(lamp, name, warn):
+    try:
+        shader = surface_shader(lamp.node_tree, "OUTPUT_LIGHT")
+        if shader is None:
+            return np.zeros(3)
+        if shader.node.type != "EMISSION":
+            raise Unreadable(f"{shader.node.bl_label} node")
+        colour = shader.feeding("Color")
+        if not colour.is_constant:
+            raise Unreadable(f"{colour.node.bl_label} node")
+        return np.array(colour.socket.default_value[:3]) * constant(shader.feeding("Strength"))
+    except Unreadable as error:
+        warn(f"light '{name}': its {error} cannot be read: its own colour and power are used")
+        return np.ones(3)
+
+
+def _is_normalised(lamp):
+    return getattr(lamp, "normalize", True)
+
+
+def _point(lamp, name, matrix, power, warn):
+    return [PointLight(name, _triple(matrix[:3, 3]), _triple(_intensity(lamp, power)), **_sphere(lamp))]
+
+
+def _spot(lamp, name, matrix, power, warn):
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    if np.ptp(scale) > 1e-4 * scale.max():
+        warn(f"light '{name}' is scaled unevenly: its cone is read as round")
+    outer = cos(lamp.spot_size / 2)
+    inner = outer + max((1 - outer) * lamp.spot_blend, NARROWEST_CONE_EDGE)
+    return [
+        PointLight(
+            name,
+            _triple(matrix[:3, 3]),
+            _triple(_intensity(lamp, power)),
+            **_sphere(lamp),
+            direction=_triple(_looks_to(matrix)),
+            cone_cosines=(outer, inner),
+        )
+    ]
+
+
+def _intensity(lamp, power):
+    """I [W/sr]; what the cone of a spot cuts off is not given to the rest."""
+    radius = lamp.shadow_soft_size
+    if _is_normalised(lamp) or radius <= 0:
+        return power / (4 * pi)
+    return power * radius**2  # a sphere of L = P / pi
+
+
+def _sphere(lamp):
+    return {"radius": float(lamp.shadow_soft_size), "soft_falloff": bool(getattr(lamp, "use_soft_falloff", False))}
+
+
+def _area(lamp, name, matrix, power, warn):
+    is_oblong = lamp.shape in {"RECTANGLE", "ELLIPSE"}
+    axis_u = matrix[:3, 0] * lamp.size / 2
+    axis_v = matrix[:3, 1] * (lamp.size_y if is_oblong else lamp.size) / 2
+    is_ellipse = lamp.shape in {"DISK", "ELLIPSE"}
+    facing = np.cross(axis_u, axis_v)
+    area = 4 * np.linalg.norm(facing) * (pi / 4 if is_ellipse else 1.0)
+    if area <= 0:
+        warn(f"light '{name}' has no area: it is left out")
+        return []
+    if facing @ _looks_to(matrix) < 0:
+        axis_v = -axis_v
+    radiance = power / (pi * area if _is_normalised(lamp) else pi)
+    axes = _triple(axis_u), _triple(axis_v)
+    return [AreaLight(name, _triple(matrix[:3, 3]), *axes, _triple(radiance), is_ellipse, float(lamp.spread))]
+
+
+def _sun(lamp, name, matrix, power, warn):
+    # With normalize off the disc's radiance is given, not the irradiance.
+    disc = pi * sin(lamp.angle / 2) ** 2
+    irradiance = power if _is_normalised(lamp) or disc == 0 else power * disc
+    return [SunLight(name, _triple(_looks_to(matrix)), _triple(irradiance), float(lamp.angle))]
+
+
+def _looks_to(matrix):
+    axis = -matrix[:3, 2]
+    length = np.linalg.norm(axis)
+    return axis / length if length > 0 else np.array([0.0, 0.0, -1.0])
+
+
+def _triple(vector):
+    return tuple(float(x) for x in vector)
+
+
+READERS = {"POINT": _point, "SPOT": _spot, "AREA": _area, "SUN": _sun}

@@ -1,0 +1,214 @@
+"""Shader nodes -> reflectance, radiance, transmittance.
+
+Everything reflects as a two-sided Lambertian surface: a glossy or metallic shader is read by its colour. An Emission of
+colour x strength has that radiance L (strength 3 bakes as 3.0 in Cycles, tested), so no pi enters here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..core.scene import Material
+from .read_images import Images
+from .shader_nodes import Reached, Unreadable, constant, follow, surface_shader
+from .surfaces import Colour, Surface, weighted_sum
+from .texture_coordinates import Coordinates, read_coordinates
+
+NO_MATERIAL = Material("no material")
+
+DIFFUSE = {"BSDF_DIFFUSE": "Color", "SUBSURFACE_SCATTERING": "Color", "BSDF_TOON": "Color", "BSDF_SHEEN": "Color"}
+GLOSSY = {
+    "BSDF_GLOSSY": "Color",
+    "BSDF_ANISOTROPIC": "Color",
+    "BSDF_METALLIC": "Base Color",
+    "EEVEE_SPECULAR": "Base Color",
+}
+PASSING = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSLUCENT"}
+# Their output depends on the ray: 0 is head-on, and not a camera ray, which is what bounced light mostly sees.
+BY_VIEW = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "NEW_GEOMETRY"}
+
+
+class Materials:
+    """The materials of one scene, each read once; ``entries[i]`` has the coordinates ``coordinates[i]``."""
+
+    def __init__(self, depsgraph, warn):
+        self.entries = [NO_MATERIAL]
+        self.coordinates = [Coordinates()]
+        self._indices = {}
+        self._depsgraph = depsgraph
+        self._warn = warn
+        self._images = Images(warn)
+
+    def index_of(self, material) -> int:
+        """Row of a Blender material (or None) in ``entries``."""
+        if material is None:
+            return 0
+        key = material.original.as_pointer()
+        if key not in self._indices:
+            reading = MaterialReading(material.evaluated_get(self._depsgraph), self._images, self._warn)
+            self._indices[key] = len(self.entries)
+            self.entries.append(reading.material())
+            self.coordinates.append(reading.coordinates())
+        return self._indices[key]
+
+
+class MaterialReading:
+    """One material being read: its name for the warnings, the coordinates that its images ask for."""
+
+    def __init__(self, blender_material, images, warn):
+        self._material = blender_material
+        self._images = images
+        self._warn = warn
+        self._coordinates = []
+
+    def material(self) -> Material:
+        """The core material; never silently black."""
+        surface = self._surface()
+        reflectance = surface.reflectance.within_one()
+        radiance = surface.radiance
+        return Material(
+            self._material.name,
+            tuple(float(x) for x in reflectance.value),
+            reflectance.texture,
+            tuple(float(max(x, 0.0)) for x in radiance.value),
+            radiance.texture,
+            tuple(float(x) for x in np.clip(surface.transmittance, 0.0, 1.0)),
+        )
+
+    def coordinates(self) -> Coordinates:
+        """The coordinates of the first image; a second kind is named."""
+        kinds = list(dict.fromkeys(self._coordinates))
+        if len(kinds) > 1:
+            self._say("its images use different coordinates: those of the first are used for all")
+        return kinds[0] if kinds else Coordinates()
+
+    def _surface(self) -> Surface:
+        if not self._material.use_nodes or self._material.node_tree is None:
+            return Surface(self._viewport_colour())
+        try:
+            shader = surface_shader(self._material.node_tree)
+            return Surface() if shader is None else self._shader(shader)
+        except Unreadable as error:
+            self._say(f"its {error} cannot be read: the viewport colour is used")
+            return Surface(self._viewport_colour())
+
+    def _shader(self, reached: Reached) -> Surface:
+        if reached.is_constant:
+            return Surface()  # an unlinked shader input is black, as Cycles has it
+        kind = reached.node.type
+        if kind == "BSDF_PRINCIPLED":
+            return self._principled(reached)
+        if kind == "EMISSION":
+            return Surface(radiance=self._emitted(reached, "Color", "Strength"))
+        if kind in DIFFUSE:
+            return Surface(self._colour(reached.feeding(DIFFUSE[kind])))
+        if kind in GLOSSY:
+            self._say(f"its {reached.node.bl_label} is baked as diffuse")
+            return Surface(self._colour(reached.feeding(GLOSSY[kind])))
+        if kind in PASSING:
+            return Surface(transmittance=self._colour(reached.feeding("Color")).mean)
+        if kind == "MIX_SHADER":
+            factor = min(max(self._mix_factor(reached.feeding(0)), 0.0), 1.0)
+            return self._sum(((1 - factor, reached.feeding(1)), (factor, reached.feeding(2))))
+        if kind == "ADD_SHADER":
+            return self._sum(((1.0, reached.feeding(0)), (1.0, reached.feeding(1))))
+        if kind == "HOLDOUT":
+            return Surface()
+        raise Unreadable(f"{reached.node.bl_label} node")
+
+    def _sum(self, parts) -> Surface:
+        return weighted_sum([(weight, self._shader(reached)) for weight, reached in parts if weight > 0])
+
+    def _principled(self, reached) -> Surface:
+        base = self._colour(reached.feeding("Base Color")).within_one()
+        transmission = self._number(reached, "Transmission Weight")
+        radiance = self._emitted(reached, "Emission Color", "Emission Strength")
+        if transmission >= 0.5:
+            surface = Surface(radiance=radiance, transmittance=base.mean)
+        else:
+            surface = Surface(base.scaled(1 - transmission), radiance)
+        alpha = min(max(self._alpha(reached), 0.0), 1.0)
+        return weighted_sum([(alpha, surface), (1 - alpha, Surface(transmittance=np.ones(3)))])
+
+    def _alpha(self, reached) -> float:
+        alpha = reached.feeding("Alpha")
+        try:
+            return constant(alpha)
+        except Unreadable:
+            self._say("its alpha texture is not read: it is baked opaque")
+            return 1.0
+
+    def _emitted(self, reached, colour_name, strength_name) -> Colour:
+        strength = self._number(reached, strength_name)
+        if strength == 0:  # whatever the colour is, it need not be readable
+            return Colour(np.zeros(3))
+        return self._colour(reached.feeding(colour_name)).scaled(strength)
+
+    def _number(self, reached, name) -> float:
+        try:
+            return constant(reached.feeding(name))
+        except Unreadable as error:
+            value = float(reached.node.inputs[name].default_value)
+            self._say(f"its {name} comes from a {error}, which cannot be read: {value:g} is used")
+            return value
+
+    def _mix_factor(self, reached) -> float:
+        try:
+            return constant(reached)
+        except Unreadable as error:
+            if reached.node.type in BY_VIEW:
+                self._say(f"its shaders are mixed by a {error}: the first one is used")
+                return 0.0
+            value = self._mean_of_image(reached)
+            self._say(f"its shaders are mixed by a {error}: they are mixed evenly by {value:.2f}")
+            return value
+
+    def _mean_of_image(self, reached) -> float:
+        if reached.node.type != "TEX_IMAGE" or reached.node.image is None or reached.socket.identifier == "Alpha":
+            return 0.5
+        try:
+            return float(np.mean(Colour(np.ones(3), self._images.texture(reached.node.image)).mean))
+        except Unreadable:
+            return 0.5
+
+    def _colour(self, reached) -> Colour:
+        try:
+            return self._readable_colour(reached)
+        except Unreadable as error:
+            self._say(f"its {error} cannot be read: the viewport colour is used")
+            return self._viewport_colour()
+
+    def _readable_colour(self, reached) -> Colour:
+        if reached.is_constant:
+            return Colour(_rgb(reached.socket.default_value))
+        if reached.node.type == "RGB":
+            return Colour(_rgb(reached.node.outputs[0].default_value))
+        if reached.node.type == "VALUE":
+            return Colour(np.full(3, constant(reached)))
+        if reached.node.type == "TEX_IMAGE" and reached.socket.identifier == "Color":
+            return self._image_colour(reached)
+        raise Unreadable(f"{reached.node.bl_label} node")
+
+    def _image_colour(self, reached) -> Colour:
+        if reached.node.image is None:
+            raise Unreadable("Image Texture node without an image")
+        colour = Colour(np.ones(3), self._images.texture(reached.node.image))
+        try:
+            if reached.node.projection != "FLAT":
+                raise Unreadable(f"{reached.node.projection.lower()} projection")
+            self._coordinates.append(read_coordinates(follow(reached.node.inputs["Vector"], reached.groups)))
+        except Unreadable as error:
+            self._say(f"its image '{reached.node.image.name}' uses {error}: the image's mean colour is used")
+            return Colour(colour.mean)
+        return colour
+
+    def _viewport_colour(self) -> Colour:
+        return Colour(np.clip(_rgb(self._material.diffuse_color), 0.0, 1.0))
+
+    def _say(self, sentence):
+        self._warn(f"material '{self._material.name}': {sentence}")
+
+
+def _rgb(value):
+    """A colour from a colour socket, or grey from a number."""
+    return np.array(value[:3], float) if hasattr(value, "__len__") else np.full(3, float(value))

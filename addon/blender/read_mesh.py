@@ -1,0 +1,120 @@
+"""One Blender mesh -> arrays of its loop triangles, in the mesh's own space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+LIGHTMAP_LAYER = "Lightmap"
+
+
+@dataclass(frozen=True, slots=True)
+class MeshArrays:
+    """The T loop triangles of a mesh of V vertices.
+
+    Attributes
+    ----------
+    positions : float64 (V, 3)
+    triangles : int32 (T, 3) vertices
+    corners : int32 (T, 3) face corners (loops)
+    polygons : int32 (T,)
+    material_slots : int32 (T,)
+    corner_normals : float32 (T, 3, 3); on flat faces the polygon's
+    is_flat : bool (T,) flat shaded: the triangle's own normal holds
+    sharp_edges : bool (T, 3) edge k runs from corner k to corner k + 1
+    uvs : dict, name of a UV layer -> float32 (T, 3, 2)
+    render_layer : str, the UV layer that textures use; "" where there is none
+    """
+
+    positions: np.ndarray
+    triangles: np.ndarray
+    corners: np.ndarray
+    polygons: np.ndarray
+    material_slots: np.ndarray
+    corner_normals: np.ndarray
+    is_flat: np.ndarray
+    sharp_edges: np.ndarray
+    uvs: dict
+    render_layer: str
+
+
+def read_mesh(mesh, uv_layers=()) -> MeshArrays:
+    """Read a mesh; of its UV layers the render layer, "Lightmap", and those named."""
+    mesh.calc_loop_triangles()
+    corners = _read(mesh.loop_triangles, "loops", np.int32, 3)
+    polygons = _read(mesh.loop_triangles, "polygon_index", np.int32, 1)
+    is_flat = _flags(mesh, "sharp_face", len(mesh.polygons))
+    edge_sharp = _sharp_corner_edges(mesh, is_flat)
+    next_corner = _next_corners(mesh)
+    # A triangle's edge inside its polygon (a diagonal) is no edge of the mesh, so it cannot be sharp.
+    is_mesh_edge = next_corner[corners] == np.roll(corners, -1, axis=1)
+    render_layer = next((layer.name for layer in mesh.uv_layers if layer.active_render), "")
+    wanted = {render_layer, LIGHTMAP_LAYER, *uv_layers}
+    return MeshArrays(
+        positions=read_positions(mesh),
+        triangles=corner_vertices(mesh)[corners],
+        corners=corners,
+        polygons=polygons,
+        material_slots=_material_slots(mesh)[polygons],
+        corner_normals=_read(mesh.corner_normals, "vector", np.float32, 3)[corners],
+        # Custom normals are bent from whatever the face has, flat faces included.
+        is_flat=is_flat[polygons] & (not mesh.has_custom_normals),
+        sharp_edges=is_mesh_edge & edge_sharp[corners],
+        uvs={layer.name: _layer_uvs(layer)[corners] for layer in mesh.uv_layers if layer.name in wanted},
+        render_layer=render_layer,
+    )
+
+
+def read_positions(mesh) -> np.ndarray:
+    """Vertex positions, float64 (V, 3)."""
+    return _attribute(mesh, "position", "vector", np.float32, 3).astype(np.float64)
+
+
+def corner_vertices(mesh) -> np.ndarray:
+    """Vertex of each face corner: two meshes with the same have the same faces. int32 (loops,)"""
+    return _attribute(mesh, ".corner_vert", "value", np.int32, 1)
+
+
+def _read(collection, name, dtype, width):
+    values = np.empty(len(collection) * width, dtype)
+    collection.foreach_get(name, values)
+    return values if width == 1 else values.reshape(-1, width)
+
+
+def _attribute(mesh, attribute, name, dtype, width):
+    found = mesh.attributes.get(attribute)
+    return np.zeros((0, width) if width > 1 else 0, dtype) if found is None else _read(found.data, name, dtype, width)
+
+
+def _flags(mesh, attribute, count):
+    found = mesh.attributes.get(attribute)
+    return np.zeros(count, bool) if found is None else _read(found.data, "value", bool, 1)
+
+
+def _material_slots(mesh):
+    if "material_index" not in mesh.attributes:
+        return np.zeros(len(mesh.polygons), np.int32)
+    return _attribute(mesh, "material_index", "value", np.int32, 1)
+
+
+def _layer_uvs(layer):
+    return np.nan_to_num(_read(layer.uv, "vector", np.float32, 2), posinf=0.0, neginf=0.0)
+
+
+def _next_corners(mesh):
+    """The corner that follows each corner around its polygon."""
+    starts = _read(mesh.polygons, "loop_start", np.int32, 1)
+    sizes = _read(mesh.polygons, "loop_total", np.int32, 1)
+    following = np.arange(1, len(mesh.loops) + 1, dtype=np.int32)
+    following[starts + sizes - 1] = starts
+    return following
+
+
+def _sharp_corner_edges(mesh, face_is_flat):
+    """Whether the edge from each corner to the next is sharp: marked so, or the side of a flat-shaded face."""
+    edges = _attribute(mesh, ".corner_edge", "value", np.int32, 1)
+    is_sharp = _flags(mesh, "sharp_edge", len(mesh.edges))
+    sizes = _read(mesh.polygons, "loop_total", np.int32, 1)
+    is_sharp[edges[np.repeat(face_is_flat, sizes)]] = True
+    return is_sharp[edges]

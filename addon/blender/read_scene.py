@@ -1,0 +1,204 @@
+"""The evaluated Blender scene -> core ``Scene``: triangles in world space, materials, lights.
+
+Blender's units are taken as metres whatever the unit scale: its lights are defined in them too.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ..core.scene import Scene, SceneError, SceneObject
+from .place_mesh import PlacedMesh, place_mesh
+from .read_lights import read_lights
+from .read_materials import Materials
+from .read_mesh import MeshArrays, read_mesh
+from .read_world import read_world
+from .targets import mesh_users, why_not_target
+from .visibility import Visibility
+
+
+class Warnings:
+    """Sentences for the report, each once, in order."""
+
+    def __init__(self):
+        self._sentences = {}
+
+    def __call__(self, sentence):
+        self._sentences[sentence] = True
+
+    def all(self) -> tuple[str, ...]:
+        return tuple(self._sentences)
+
+
+def read_scene(bpy_scene, object_names=None, mesh_for=None) -> Scene:
+    """Read what a render of ``bpy_scene`` shows.
+
+    Parameters
+    ----------
+    object_names : names of the objects to bake; None = all that can be
+    mesh_for : callable (object, world matrix) -> Mesh or None; a mesh to read in place of a target's own
+
+    Raises
+    ------
+    SceneError : a named object is unknown or cannot be baked, or nothing can be
+    """
+    view_layer = _view_layer(bpy_scene)
+    view_layer.update()
+    reading = SceneReading(view_layer, None if object_names is None else set(object_names), mesh_for)
+    reading.read_objects()
+    return reading.scene(bpy_scene.world)
+
+
+def _view_layer(bpy_scene):
+    return bpy.context.view_layer if bpy_scene == bpy.context.scene else bpy_scene.view_layers[0]
+
+
+@dataclass
+class SceneReading:
+    """A scene on its way from the depsgraph into arrays."""
+
+    view_layer: object
+    wanted: set[str] | None
+    mesh_for: object
+    warn: Warnings = field(default_factory=Warnings)
+    placed: list[PlacedMesh] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    is_target: list[bool] = field(default_factory=list)
+
+    def __post_init__(self):
+        self.depsgraph = self.view_layer.depsgraph
+        self.visibility = Visibility(self.view_layer)
+        self.materials = Materials(self.depsgraph, self.warn)
+        self.refusals = {}
+
+    def read_objects(self):
+        """Append every mesh entry of the depsgraph that a render shows."""
+        self._require_known()
+        users = mesh_users(self.depsgraph)
+        entries = Counter()
+        # The iterator's objects are temporary: nothing of them is kept past its turn of the loop. Curves and their
+        # like come twice, as themselves and as meshes; only the meshes are taken.
+        for instance in self.depsgraph.object_instances:
+            if instance.object.type != "MESH" or instance.object.original.hide_render:
+                continue
+            name = instance.object.name
+            number, entries[name] = entries[name], entries[name] + 1
+            if self.visibility.shows(instance):
+                self._read_instance(instance, f"{name}#{number}" if instance.is_instance else name, users)
+        self._require_targets()
+        for name in self.visibility.viewport_hidden_names():
+            self.warn(f"'{name}' is hidden in the viewport: the bake does not see it")
+
+    def scene(self, world) -> Scene:
+        """All that was read, as one core Scene."""
+        lights = read_lights(self.depsgraph, self.visibility, self.warn)
+        world_radiance = read_world(world, self.depsgraph, self.warn)
+        first_vertices = np.cumsum([0] + [len(p.vertices) for p in self.placed])
+        triangles = [p.triangles + first for p, first in zip(self.placed, first_vertices)]
+        return Scene(
+            vertices=_joined([p.vertices for p in self.placed], np.float64, (0, 3)),
+            triangles=_joined(triangles, np.int32, (0, 3)),
+            corner_normals=_joined([p.corner_normals for p in self.placed], np.float32, (0, 3, 3)),
+            uvs=_joined([p.uvs for p in self.placed], np.float32, (0, 3, 2)),
+            triangle_materials=_joined([p.materials for p in self.placed], np.int32, (0,)),
+            objects=self._objects(),
+            materials=tuple(self.materials.entries),
+            lights=lights,
+            world_radiance=world_radiance,
+            warnings=self.warn.all(),
+        )
+
+    def _objects(self):
+        firsts = np.cumsum([0] + [len(p.triangles) for p in self.placed])
+        return tuple(
+            SceneObject(name, int(first), len(p.triangles), target, **p.mesh_arrays())
+            for name, first, target, p in zip(self.names, firsts, self.is_target, self.placed)
+        )
+
+    def _read_instance(self, instance, name, users):
+        evaluated = instance.object
+        matrix = np.array(instance.matrix_world, np.float64)
+        mesh = evaluated.to_mesh()
+        try:
+            if not len(mesh.polygons):
+                return
+            target = self._is_wanted(evaluated.original.name) and self._is_target(instance, mesh, users)
+            replacement = self.mesh_for(evaluated.original, matrix) if target and self.mesh_for else None
+            self._append(name, target, evaluated, replacement or mesh, matrix)
+        finally:
+            evaluated.to_mesh_clear()
+
+    def _append(self, name, target, evaluated, mesh, matrix):
+        rows, layers = self._slot_materials(evaluated, mesh)
+        arrays = read_mesh(mesh, layers)
+        if not (np.isfinite(arrays.positions).all() and np.isfinite(matrix).all()):
+            self.refusals[name] = f"'{name}' has vertices that are not finite (NaN or infinite): it is left out"
+            self.warn(self.refusals[name])
+            return
+        materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
+        placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
+        if placed.degenerate_count:
+            noun = "triangle" if placed.degenerate_count == 1 else "triangles"
+            self.warn(f"'{name}' has {placed.degenerate_count} {noun} without area")
+        self.placed.append(placed)
+        self.names.append(name)
+        self.is_target.append(target)
+
+    def _slot_materials(self, evaluated, mesh):
+        """Rows of ``materials`` by material slot, int32 (slots or 1,), and the UV layers that they ask for."""
+        materials = list(mesh.materials)
+        for index, slot in enumerate(evaluated.material_slots):
+            if index >= len(materials):
+                materials.append(slot.material)
+            elif slot.link == "OBJECT":
+                materials[index] = slot.material
+        rows = np.array([self.materials.index_of(material) for material in materials or [None]], np.int32)
+        return rows, {self.materials.coordinates[row].uv_layer for row in rows}
+
+    def _texture_uvs(self, arrays: MeshArrays, materials):
+        """Each triangle's UVs as its material looks them up, float32 (T, 3, 2)."""
+        uvs = np.zeros((len(materials), 3, 2), np.float32)
+        for row in np.unique(materials):
+            coordinates = self.materials.coordinates[row]
+            layer = arrays.uvs.get(coordinates.uv_layer or arrays.render_layer)
+            if layer is not None:
+                uvs[materials == row] = coordinates.applied(layer[materials == row])
+        return uvs
+
+    def _is_wanted(self, name):
+        return self.wanted is None or name in self.wanted
+
+    def _is_target(self, instance, mesh, users):
+        reason = why_not_target(instance, mesh, users)
+        if reason is None:
+            return True
+        name = instance.object.original.name
+        # A named object may also be instanced elsewhere: only its own entry has to be bakeable.
+        self.refusals.setdefault(name, reason)
+        if self.wanted is None:
+            self.warn(reason)
+        return False
+
+    def _require_known(self):
+        hidden = self.visibility.hidden_names()
+        for name in sorted(self.wanted or ()):
+            if name not in self.view_layer.objects:
+                raise SceneError(f"there is no object '{name}' in the view layer '{self.view_layer.name}'")
+            if name in hidden:
+                raise SceneError(f"'{name}' is hidden from renders: it cannot be baked")
+
+    def _require_targets(self):
+        targets = {name for name, is_target in zip(self.names, self.is_target) if is_target}
+        for name in sorted((self.wanted or set()) - targets):
+            raise SceneError(self.refusals.get(name, f"'{name}' has no visible faces: it cannot be baked"))
+        if not targets:
+            reasons = "; ".join(list(self.refusals.values())[:1])
+            raise SceneError(f"nothing to bake: {reasons or 'no visible mesh object has faces'}")
+
+
+def _joined(arrays, dtype, empty_shape):
+    return np.concatenate(arrays).astype(dtype, copy=False) if arrays else np.zeros(empty_shape, dtype)

@@ -1,0 +1,94 @@
+"""Following links through a shader node tree: reroutes, muted nodes and groups are walked through, never read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+GROUP_DEPTH = 8  # a tree that nests deeper is not read; Blender forbids true recursion
+
+
+class Unreadable(ValueError):
+    """A node set-up without a constant meaning; the message says which node."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """What feeds an input: the output ``socket`` of ``node``, or the unlinked input ``socket`` itself (node None).
+
+    ``groups`` are the group nodes around it, outermost first: the way back out of a Group Input.
+    """
+
+    socket: object
+    node: object | None
+    groups: tuple
+
+    @property
+    def is_constant(self) -> bool:
+        return self.node is None
+
+    def feeding(self, name) -> Reached:
+        """What feeds this node's input of that name, or of that position."""
+        return follow(self.node.inputs[name], self.groups)
+
+
+def follow(socket, groups=()) -> Reached:
+    """Walk from an input back to the node that feeds it."""
+    while True:
+        link = _live_link(socket)
+        if link is None:
+            return Reached(socket, None, groups)
+        node = link.from_node
+        if node.mute:
+            socket = _passed_through(link)
+        elif node.type == "REROUTE":
+            socket = node.inputs[0]
+        elif node.type == "GROUP":
+            socket, groups = _into_group(node, link.from_socket, groups)
+        elif node.type == "GROUP_INPUT" and groups:
+            socket, groups = _same_socket(groups[-1].inputs, link.from_socket), groups[:-1]
+        else:
+            return Reached(link.from_socket, node, groups)
+
+
+def surface_shader(node_tree, output_type="OUTPUT_MATERIAL") -> Reached | None:
+    """The shader that Cycles renders, or None where nothing is linked to the Surface."""
+    outputs = [node for node in node_tree.nodes if node.type == output_type and node.target in {"ALL", "CYCLES"}]
+    output = next((node for node in outputs if node.is_active_output), outputs[0] if outputs else None)
+    if output is None:
+        return None
+    reached = follow(output.inputs["Surface"])
+    return None if reached.is_constant else reached
+
+
+def constant(reached: Reached) -> float:
+    """A number that does not vary over the surface."""
+    if reached.is_constant:
+        return float(reached.socket.default_value)
+    if reached.node.type == "VALUE":
+        return float(reached.node.outputs[0].default_value)
+    raise Unreadable(f"{reached.socket.node.bl_label} node")
+
+
+def _live_link(socket):
+    return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
+
+
+def _passed_through(link):
+    for inner in link.from_node.internal_links:
+        if inner.to_socket == link.from_socket:
+            return inner.from_socket
+    raise Unreadable(f"muted {link.from_node.bl_label} node")
+
+
+def _into_group(node, from_socket, groups):
+    if node.node_tree is None or len(groups) >= GROUP_DEPTH:
+        raise Unreadable(f"group '{node.name}'")
+    inner = [n for n in node.node_tree.nodes if n.type == "GROUP_OUTPUT"]
+    output = next((n for n in inner if n.is_active_output), None)
+    if output is None:
+        raise Unreadable(f"group '{node.name}'")
+    return _same_socket(output.inputs, from_socket), (*groups, node)
+
+
+def _same_socket(sockets, wanted):
+    return next(socket for socket in sockets if socket.identifier == wanted.identifier)

@@ -1,0 +1,84 @@
+"""Colours and surfaces as a material's nodes combine them: a mix is a weighted sum, an add is a sum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..core.scene import Texture
+from .read_images import mean_colour
+
+BLACK = np.zeros(3)
+
+
+@dataclass(frozen=True, slots=True)
+class Colour:
+    """A linear colour, times a texture where there is one."""
+
+    value: np.ndarray
+    texture: Texture | None = None
+
+    @property
+    def is_black(self) -> bool:
+        return not np.any(self.value)
+
+    @property
+    def mean(self) -> np.ndarray:
+        """One colour for the whole texture."""
+        return self.value if self.texture is None else self.value * mean_colour(self.texture.pixels)
+
+    def scaled(self, factor) -> Colour:
+        return Colour(self.value * factor, self.texture)
+
+    def within_one(self) -> Colour:
+        """Clipped to [0, 1]: a surface cannot reflect more than arrives."""
+        if self.texture is None:
+            return Colour(np.clip(self.value, 0.0, 1.0))
+        pixels = self.texture.pixels
+        if pixels.min() >= 0 and (pixels.max(axis=(0, 1)) * self.value).max() <= 1 and self.value.min() >= 0:
+            return self
+        clipped = np.clip(pixels * self.value, 0.0, 1.0).astype(np.float32)
+        return Colour(np.ones(3), Texture(self.texture.name, clipped))
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """What a shader does with light: reflect it diffusely, emit it, let it pass."""
+
+    reflectance: Colour = field(default_factory=lambda: Colour(BLACK))
+    radiance: Colour = field(default_factory=lambda: Colour(BLACK))
+    transmittance: np.ndarray = field(default_factory=lambda: BLACK)
+
+
+def weighted_sum(parts) -> Surface:
+    """The surface that reflects, emits and passes the weighted sum of the parts: (weight, Surface) pairs."""
+    return Surface(
+        _sum_colours([surface.reflectance.scaled(weight) for weight, surface in parts]),
+        _sum_colours([surface.radiance.scaled(weight) for weight, surface in parts]),
+        sum((weight * surface.transmittance for weight, surface in parts), BLACK),
+    )
+
+
+def _sum_colours(colours) -> Colour:
+    colours = [colour for colour in colours if not colour.is_black]
+    textures = {id(colour.texture): colour.texture for colour in colours if colour.texture is not None}
+    if len(textures) == 0:
+        return Colour(sum((colour.value for colour in colours), BLACK))
+    if len(textures) == 1 and all(colour.texture is not None for colour in colours):
+        return Colour(sum((colour.value for colour in colours), BLACK), colours[0].texture)
+    return Colour(np.ones(3), _sum_textures(colours, list(textures.values())))
+
+
+def _sum_textures(colours, textures) -> Texture:
+    shape = max((texture.pixels.shape for texture in textures), key=lambda shape: shape[0] * shape[1])
+    pixels = np.zeros(shape, np.float32)
+    for colour in colours:
+        pixels += colour.value if colour.texture is None else colour.value * _resampled(colour.texture.pixels, shape)
+    return Texture(" + ".join(texture.name for texture in textures), pixels)
+
+
+def _resampled(pixels, shape):
+    rows = np.arange(shape[0]) * pixels.shape[0] // shape[0]
+    columns = np.arange(shape[1]) * pixels.shape[1] // shape[1]
+    return pixels[rows[:, None], columns]

@@ -1,0 +1,80 @@
+"""Which objects a bake can be stored on, and in one sentence why not the others."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from .read_mesh import corner_vertices
+
+KINDS = {"CURVE": "a curve", "SURFACE": "a NURBS surface", "META": "a metaball", "FONT": "a text"}
+CONVERT = "convert it to a mesh to bake it"
+
+# Modifiers that move vertices and leave the faces alone; any other that is on is named when the faces differ.
+KEEPS_FACES = {
+    *("ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM", "SHRINKWRAP"),
+    *("SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH", "SURFACE_DEFORM", "WARP", "WAVE", "CLOTH"),
+    *("SOFT_BODY", "UV_PROJECT", "UV_WARP", "NORMAL_EDIT", "WEIGHTED_NORMAL", "VOLUME_DISPLACE", "MESH_CACHE"),
+}
+
+
+def mesh_users(depsgraph) -> Counter:
+    """How many visible objects use each mesh, by the mesh's pointer."""
+    users = Counter()
+    for instance in depsgraph.object_instances:
+        if instance.object.type == "MESH" and not instance.is_instance and not instance.object.original.hide_render:
+            users[instance.object.original.data.as_pointer()] += 1
+    return users
+
+
+def why_not_target(instance, mesh, users: Counter) -> str | None:
+    """Why no result can be stored on this entry of the depsgraph, or None when it can; ``mesh`` is as evaluated."""
+    blender_object = instance.object.original
+    name = blender_object.name
+    if blender_object.type != "MESH":
+        return f"'{name}' is {KINDS.get(blender_object.type, 'no mesh object')}: it is not baked; {CONVERT}"
+    if instance.is_instance:
+        return _instanced(instance.parent.original.name, name)
+    data = blender_object.data
+    if blender_object.library or data.library or blender_object.override_library:
+        return f"'{name}' is linked from another file: it is not baked; make it local to bake it"
+    if users[data.as_pointer()] > 1:
+        return (
+            f"'{name}' shares its mesh '{data.name}' with other objects: it is not baked; "
+            "make it a single user (Object > Relations > Make Single User) to bake it"
+        )
+    if data.is_editmode:
+        return f"'{name}' is in Edit Mode: it is not baked; leave Edit Mode to bake it"
+    if not _has_faces_of(mesh, data):
+        return _modified(blender_object)
+    return None
+
+
+def _instanced(instancer, name):
+    if instancer == name:
+        return f"'{name}' makes instances: they are not baked; make them real to bake them"
+    return f"'{name}' is instanced by '{instancer}': its instances are not baked; make them real to bake them"
+
+
+def _has_faces_of(mesh, original):
+    if len(mesh.loops) != len(original.loops) or len(mesh.polygons) != len(original.polygons):
+        return False
+    return np.array_equal(corner_vertices(mesh), corner_vertices(original))
+
+
+def _modified(blender_object):
+    makers = [
+        modifier.name
+        for modifier in blender_object.modifiers
+        if modifier.show_viewport and modifier.type not in KEEPS_FACES
+    ]
+    if not makers:
+        return (
+            f"'{blender_object.name}' has other faces once evaluated: it is not baked; make it a plain mesh to bake it"
+        )
+    noun = "modifier" if len(makers) == 1 else "modifiers"
+    return (
+        f"{' and '.join(makers)} {noun} on '{blender_object.name}' makes new faces: "
+        f"it is not baked; apply the {noun} to bake it"
+    )

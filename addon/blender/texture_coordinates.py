@@ -1,0 +1,76 @@
+"""Which UVs an Image Texture node looks up: the UV layer, and the Mapping node between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, sin
+
+import numpy as np
+
+from .shader_nodes import Reached, Unreadable
+
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinates:
+    """The UV layer ("" = the mesh's render layer) and the affine map after it, the rows of a 2 x 3 matrix."""
+
+    uv_layer: str = ""
+    affine: tuple[float, ...] = IDENTITY
+
+    def applied(self, uvs) -> np.ndarray:
+        """uvs : float32 (..., 2), mapped."""
+        if self.affine == IDENTITY:
+            return uvs
+        matrix = np.array(self.affine).reshape(2, 3)
+        return (uvs @ matrix[:, :2].T + matrix[:, 2]).astype(np.float32)
+
+
+def read_coordinates(vector: Reached) -> Coordinates:
+    """Where the Vector input of an Image Texture comes from; Unreadable when not from UVs."""
+    if vector.is_constant:
+        return Coordinates()
+    node = vector.node
+    if node.type == "UVMAP":
+        return Coordinates(node.uv_map)
+    if node.type == "TEX_COORD" and vector.socket.identifier == "UV":
+        return Coordinates()
+    if node.type == "MAPPING":
+        inner = read_coordinates(vector.feeding("Vector"))
+        if vector.feeding("Vector").is_constant:
+            raise Unreadable("Mapping node without coordinates")
+        return Coordinates(inner.uv_layer, _after(_mapping_affine(vector), inner.affine))
+    raise Unreadable(f"{node.bl_label} coordinates")
+
+
+def _mapping_affine(mapping: Reached):
+    node = mapping.node
+    location, rotation, scale = (_constant_vector(mapping, name) for name in ("Location", "Rotation", "Scale"))
+    if abs(rotation[0]) > 1e-6 or abs(rotation[1]) > 1e-6:
+        raise Unreadable("Mapping node that turns out of the UV plane")
+    turn = np.array([[cos(rotation[2]), -sin(rotation[2])], [sin(rotation[2]), cos(rotation[2])]])
+    if node.vector_type == "TEXTURE":
+        if min(abs(scale[0]), abs(scale[1])) == 0:
+            raise Unreadable("Mapping node of scale 0")
+        linear = np.diag(1 / np.array(scale[:2])) @ turn.T
+        return np.column_stack([linear, -linear @ location[:2]])
+    if node.vector_type not in {"POINT", "VECTOR"}:
+        raise Unreadable(f"Mapping node of type {node.vector_type.title()}")
+    shift = location[:2] if node.vector_type == "POINT" else (0.0, 0.0)
+    return np.column_stack([turn @ np.diag(scale[:2]), shift])
+
+
+def _constant_vector(mapping, name):
+    if name not in mapping.node.inputs:  # a Vector mapping has no location
+        return (0.0, 0.0, 0.0)
+    reached = mapping.feeding(name)
+    if not reached.is_constant:
+        raise Unreadable(f"Mapping node whose {name} is linked")
+    return tuple(reached.socket.default_value)
+
+
+def _after(outer, inner):
+    """outer(inner(uv)) as six numbers."""
+    square = [np.vstack([np.reshape(affine, (2, 3)), (0, 0, 1)]) for affine in (outer, inner)]
+    return tuple(float(x) for x in (square[0] @ square[1])[:2].ravel())

@@ -1,0 +1,48 @@
+"""What a render would show: render visibility of objects, collections and instancers."""
+
+from __future__ import annotations
+
+RENDERED_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "VOLUME", "CURVES", "LIGHT"}
+
+
+class Visibility:
+    """Render visibility in one view layer; the depsgraph itself only knows the viewport's."""
+
+    def __init__(self, view_layer):
+        self._view_layer = view_layer
+        self._rendered = set()
+        self._collect(view_layer.layer_collection)
+
+    def shows(self, instance) -> bool:
+        """Whether a render shows this entry of ``depsgraph.object_instances``."""
+        blender_object = instance.object.original
+        if blender_object.hide_render:
+            return False
+        if instance.is_instance:
+            parent = instance.parent.original
+            return not parent.hide_render and parent.name in self._rendered
+        if blender_object.is_instancer and not blender_object.show_instancer_for_render:
+            return False
+        return blender_object.name in self._rendered
+
+    def hidden_names(self) -> set[str]:
+        """Objects of the view layer that no render shows."""
+        return {o.name for o in self._view_layer.objects if o.hide_render or o.name not in self._rendered}
+
+    def viewport_hidden_names(self) -> list[str]:
+        """Objects that a render shows but the viewport, and so the depsgraph, does not."""
+        return [
+            o.name
+            for o in self._view_layer.objects
+            if o.type in RENDERED_TYPES
+            and o.name in self._rendered
+            and not o.hide_render
+            and not o.visible_get(view_layer=self._view_layer)
+        ]
+
+    def _collect(self, layer_collection):
+        if layer_collection.exclude or layer_collection.collection.hide_render:
+            return
+        self._rendered.update(o.name for o in layer_collection.collection.objects)
+        for child in layer_collection.children:
+            self._collect(child)

@@ -1,0 +1,33 @@
+"""Baked corner colours -> the colour attribute that the viewport and materials show."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+ATTRIBUTE = "Patchlight"
+
+
+def write_vertex_colours(targets, corner_colours) -> None:
+    """Store E / pi per face corner; ``corner_colours`` is float32 (T, 3, 3) over the scene's triangles."""
+    for target in targets:
+        mesh = bpy.data.objects[(target.name, None)].data
+        values = np.ones((len(mesh.loops), 4), np.float32)
+        values[:, :3] = 0.0
+        values[target.corners, :3] = corner_colours[target.span]
+        attribute = _attribute(mesh)
+        attribute.data.foreach_set("color", values.ravel())
+        mesh.update()
+
+
+def _attribute(mesh):
+    found = mesh.attributes.get(ATTRIBUTE)
+    if found is not None and (found.domain, found.data_type) != ("CORNER", "FLOAT_COLOR"):
+        mesh.attributes.remove(found)
+        found = None
+    if found is None:
+        mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "CORNER")
+    index = mesh.color_attributes.find(ATTRIBUTE)
+    mesh.color_attributes.active_color_index = index
+    mesh.color_attributes.render_color_index = index
+    return mesh.color_attributes[index]
