@@ -148,5 +148,27 @@ class KernelScene:
         return irradiance, variance, sum(rays)
 
 
+def rasterise_texels(uvs, width, height):
+    """Receivers among the texels: triangles int32, distances float32 [texels], (height, width); barycentrics float32.
+
+    ``uvs`` float32 (T, 3, 2) in texels; layout of the outputs: native/include/patchlight.h.
+    """
+    triangles, distances = np.empty((height, width), np.int32), np.empty((height, width), np.float32)
+    barycentrics = np.empty((height, width, 3), np.float32)
+    _kernel.rasterise_texels(_rows(uvs, np.float32), width, height, triangles, distances, barycentrics)
+    return triangles, distances, barycentrics
+
+
+def pack_charts(uvs, first_triangles, density, width, block):
+    """Places int32 (C, 3) (column, row, is turned) of charts in an atlas, and the rows that they take [texels].
+
+    ``uvs`` float64 (T, 3, 2), triangles sorted by chart; chart c has ``first_triangles[c] : first_triangles[c + 1]``.
+    """
+    places = np.empty((len(first_triangles) - 1, 3), np.int32)
+    first_triangles = _rows(first_triangles, np.int32)
+    height = _kernel.pack_charts(_rows(uvs, np.float64), first_triangles, density, width, block, places)
+    return places, height
+
+
 def _rows(array, dtype):
     return np.ascontiguousarray(array, dtype)

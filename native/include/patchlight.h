@@ -219,9 +219,38 @@ pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_rec
                     float *out_irradiance, float *out_variance, uint64_t *out_rays);
 
 /*
- * Which texels of a lightmap are receivers, and of which point.
+ * Which texels of a lightmap are receivers, and of which point: each texel whose square of bilinear influence
+ * (less than 1 texel from its centre along both axes) meets a triangle, and the nearest point of these triangles.
+ * What is nearer wins, inside at distance 0; among equals, to 1e-6 texels, the lower triangle.
  *
- * TEXELS-SECTION (see texels.c)
+ *   uvs               6 * triangle_count: corners in texels, the centre of column i at i + 0.5; a triangle with a
+ *                     corner that is not finite has no place; zero area is allowed
+ *   width, height     at least 1; what lies outside is cut off
+ *   out_triangles     width * height indices, -1 where no triangle is near
+ *   out_distances     width * height: from the centre to the point [texels], 0 inside, infinite where none
+ *   out_barycentrics  3 * width * height: the point, 0 where none
  */
+pl_status pl_rasterise_texels(const float *uvs, size_t triangle_count, int32_t width, int32_t height,
+                              int32_t *out_triangles, float *out_distances, float *out_barycentrics);
+
+/*
+ * Places for charts in an atlas, such that no texel has two charts within bilinear reach, and one free block
+ * between them: bottom-left first fit of the outlines, large charts first.
+ *
+ *   uvs              6 * triangle_count: corners in a frame of the chart's own, not negative, from (0, 0)
+ *   first_triangles  chart_count + 1: chart c has triangles first_triangles[c] .. first_triangles[c + 1] - 1
+ *   density          texels per unit of uvs
+ *   width            of the atlas [texels]
+ *   block            charts are placed in steps of so many texels; 1 packs best, more is faster in a large atlas
+ *   out_places       3 * chart_count: column and row of the chart's first block, and whether it is turned (u and v
+ *                    swapped). A corner stands at block * (column, row) + PL_CHART_START + density * (u, v)
+ *   out_height       rows used [texels]
+ *
+ * PL_ERR_ARGUMENT also where a chart is wider and higher than the atlas is wide.
+ */
+#define PL_CHART_START 0.504
+pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t *first_triangles,
+                         size_t chart_count, double density, int32_t width, int32_t block, int32_t *out_places,
+                         int32_t *out_height);
 
 #endif

@@ -293,6 +293,55 @@ static PyObject *direct(PyObject *self, PyObject *args) {
     return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
 }
 
+static PyObject *rasterise_texels(PyObject *self, PyObject *args) {
+    PyObject *objects[4];
+    int width, height;
+    pl_status status = PL_ERR_ARGUMENT;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OiiOOO", &objects[0], &width, &height, &objects[1], &objects[2], &objects[3]))
+        return NULL;
+    const Py_ssize_t texels = width > 0 && height > 0 ? (Py_ssize_t)width * height : 0;
+    door_array arrays[] = {{"uvs", 'f', 6, -1, false, {0}},
+                           {"out_triangles", 'i', 1, texels, true, {0}},
+                           {"out_distances", 'f', 1, texels, true, {0}},
+                           {"out_barycentrics", 'f', 3, texels, true, {0}}};
+    if (!door_arrays(objects, arrays, 4))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    status = pl_rasterise_texels(arrays[0].view.buf, door_rows(&arrays[0]), width, height, arrays[1].view.buf,
+                                 arrays[2].view.buf, arrays[3].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 4);
+    return door_result(status);
+}
+
+static PyObject *pack_charts(PyObject *self, PyObject *args) {
+    PyObject *objects[3];
+    double density;
+    int width, block;
+    int32_t height = 0;
+    pl_status status = PL_ERR_ARGUMENT;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOdiiO", &objects[0], &objects[1], &density, &width, &block, &objects[2]))
+        return NULL;
+    door_array arrays[] = {{"uvs", 'd', 6, -1, false, {0}},
+                           {"first_triangles", 'i', 1, -1, false, {0}},
+                           {"out_places", 'i', 3, -1, true, {0}}};
+    if (!door_arrays(objects, arrays, 3))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    if (door_rows(&arrays[1]) == door_rows(&arrays[2]) + 1)
+        status = pl_pack_charts(arrays[0].view.buf, door_rows(&arrays[0]), arrays[1].view.buf, door_rows(&arrays[2]),
+                                density, width, block, arrays[2].view.buf, &height);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 3);
+    return status == PL_OK ? PyLong_FromLong(height) : door_result(status);
+}
+
 static PyMethodDef methods[] = {
     {"open_embree", open_embree, METH_VARARGS, "open_embree(path) -> embree"},
     {"create_scene", create_scene, METH_VARARGS,
@@ -318,6 +367,10 @@ static PyMethodDef methods[] = {
     {"direct", direct, METH_VARARGS,
      "direct(scene, kinds, parameters, corners, radiances, cumulative, positions, normals, "
      "triangle_sides, first, count, samples, seed, out_irradiance, out_variance) -> rays"},
+    {"rasterise_texels", rasterise_texels, METH_VARARGS,
+     "rasterise_texels(uvs, width, height, out_triangles, out_distances, out_barycentrics)"},
+    {"pack_charts", pack_charts, METH_VARARGS,
+     "pack_charts(uvs, first_triangles, density, width, block, out_places) -> height"},
     {NULL, NULL, 0, NULL},
 };
 
