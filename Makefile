@@ -11,15 +11,16 @@ OUT := out
 BUILD := build
 
 KERNEL := addon/core/_kernel.abi3.so
-KERNEL_SOURCES := $(wildcard native/src/*.c) native/python/module.c
-KERNEL_HEADERS := $(wildcard native/include/*.h native/src/*.h)
-C_FILES := $(KERNEL_SOURCES) $(KERNEL_HEADERS) $(wildcard tests/native/*.[ch])
+KERNEL_SOURCES := $(wildcard native/src/*.c)
+DOOR_SOURCES := $(wildcard native/python/*.c)
+KERNEL_HEADERS := $(wildcard native/include/*.h native/src/*.h native/python/*.h)
+C_FILES := $(KERNEL_SOURCES) $(DOOR_SOURCES) $(KERNEL_HEADERS) $(wildcard tests/native/*.[ch])
 
 WARNINGS := -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Werror
 SANITIZE := -std=c11 -O1 -g -ffp-contract=off -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
 C_TESTS := $(patsubst tests/native/%.c,$(BUILD)/native/%,$(wildcard tests/native/test_*.c))
 
-.PHONY: bake test check lint native-tests kernel zip clean distclean
+.PHONY: bake test check lint native-tests kernel zip format clean distclean
 .DELETE_ON_ERROR:
 
 # ---- set-up: each stamp is newer than what it was made from ----
@@ -36,9 +37,9 @@ $(VENV)/.made:
 $(VENV)/.installed: $(VENV)/.made pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "setuptools>=77,<85"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation --editable ".[bpy,dev]"
-	@touch $@ $(KERNEL)
+	@touch $@
 
-$(KERNEL): $(KERNEL_SOURCES) $(KERNEL_HEADERS) | $(VENV)/.installed
+$(KERNEL): $(KERNEL_SOURCES) $(DOOR_SOURCES) $(KERNEL_HEADERS) | $(VENV)/.installed
 	$(BIN)/python -c "import setuptools; setuptools.setup()" --quiet build_ext --inplace --force
 	@touch $@
 
@@ -59,10 +60,10 @@ lint: $(VENV)/.installed
 	$(if $(C_FILES),$(BIN)/clang-format --dry-run -Werror $(C_FILES))
 	$(CC) -std=c11 -O3 -fsyntax-only -fvisibility=hidden $(WARNINGS) -DPy_LIMITED_API=0x030B0000 -Inative/include \
 	    -isystem $(shell $(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("include"))' 2>/dev/null) \
-	    $(KERNEL_SOURCES)
+	    $(KERNEL_SOURCES) $(DOOR_SOURCES)
 
 # A C test is a program of plain asserts, linked with the whole kernel; it finds Embree by the environment.
-$(BUILD)/native/%: tests/native/%.c $(filter-out native/python/module.c,$(KERNEL_SOURCES)) $(KERNEL_HEADERS) $(wildcard tests/native/*.h)
+$(BUILD)/native/%: tests/native/%.c $(KERNEL_SOURCES) $(KERNEL_HEADERS) $(wildcard tests/native/*.h)
 	@mkdir -p $(@D)
 	$(CC) $(SANITIZE) $(WARNINGS) -Inative/include -Inative/src $(filter %.c,$^) -o $@ -lm -ldl -lpthread
 
@@ -74,6 +75,19 @@ native-tests: $(C_TESTS) | $(VENV)/.installed
 	done
 FIND_EMBREE := import glob, importlib.util as u, pathlib as p; \
     print(glob.glob(str(p.Path(u.find_spec('embreex').origin).parents[1] / 'embreex.libs' / 'libembree4*'))[0])
+
+# Zig's C compiler makes the kernels of all platforms here; it is needed for nothing else.
+$(VENV)/.zig: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check ziglang==0.14.1
+	@touch $@
+
+zip: kernel $(VENV)/.zig
+	$(BIN)/python native/build.py
+
+format: $(VENV)/.installed
+	$(BIN)/ruff check --fix-only .
+	$(BIN)/ruff format .
+	$(BIN)/clang-format -i $(C_FILES)
 
 clean:
 	rm -rf $(BUILD) $(OUT) dist *.egg-info $(KERNEL) .pytest_cache .ruff_cache .hypothesis

@@ -12,7 +12,6 @@ import json
 import os
 import signal
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -24,8 +23,6 @@ NO_BLENDER = (
     "or use blender --command patchlight"
 )
 EXIT_ERROR, EXIT_CANCELLED = 1, 130
-# what a bake costs once the file is open and has its UVs, to hold against other bakers
-STAGES_OF_A_BAKE = ("read", "texels", "solve", "gather", "write")
 DEFAULTS = BakeSettings()
 
 
@@ -57,8 +54,9 @@ def _expected_errors():
     errors = (CommandError, SettingsError, SceneError, OSError)
     if "bpy" in sys.modules:
         from .blender.files import FileError
+        from .blender.picture import PictureError
 
-        errors += (FileError,)
+        errors += (FileError, PictureError)
     return errors
 
 
@@ -70,12 +68,13 @@ def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="patchlight", description="Bake the diffuse light of interiors by radiosity.")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     _add_bake(commands)
-    demo = commands.add_parser("demo", help="write a .blend with the demo scenes, ready to bake")
-    demo.add_argument("output", type=Path, metavar="OUT.blend")
+    demo = commands.add_parser("demo", help="write the demo scenes, cornell.blend and room.blend, ready to bake")
+    demo.add_argument("folder", type=Path, metavar="DIR")
     demo.set_defaults(run=run_demo)
     picture = commands.add_parser("picture", help="render a baked .blend, lit by nothing but the bake")
     picture.add_argument("input", type=Path, metavar="BAKED.blend")
     picture.add_argument("output", type=Path, metavar="OUT.png")
+    picture.add_argument("--lightmap", type=Path, metavar="OUT.png", help="the lightmap itself, too, to look at")
     picture.set_defaults(run=run_picture)
     return top
 
@@ -131,70 +130,89 @@ def settings_from(args: argparse.Namespace) -> BakeSettings:
 def run_bake(args: argparse.Namespace) -> None:
     """``patchlight bake``: open, read, bake, write, save; files appear only when all of the bake has succeeded."""
     settings = settings_from(args)
+    if args.exr and args.target != "lightmap":
+        raise CommandError("--exr writes the lightmap: it needs --target lightmap")
     output = args.output or args.input.with_name(f"{args.input.stem}_baked.blend")
-    _check_bake_arguments(args, output)
     seconds: dict[str, float] = {}
     with _blender() as bpy, ProgressBar() as progress:
         from .blender import bake_scene, files
         from .core.bake import bake
 
+        _require_writable(output, args)
         progress("load", 0.0)
         with _timed(seconds, "load"):
             files.open_blend(args.input)
         progress("read", 0.0)
         with _timed(seconds, "read"):
             prepared = bake_scene.prepare(bpy.context.scene, settings, args.objects, args.subdivide)
-        try:
-            result = bake(prepared.scene, settings, progress)
-        except BaseException:
-            bake_scene.discard(prepared)
-            raise
+        result = bake(prepared.scene, settings, progress)
         with _uninterrupted():
             with _timed(seconds, "write"):
                 bake_scene.write(prepared, result)
-            report = _save(args, output, result, seconds)
+            with _timed(seconds, "save"):
+                if args.exr:
+                    _save_exr(prepared, args.exr)
+                files.save_blend(output)
+            report = result.report.with_stages(seconds)
+            if args.report:
+                args.report.write_text(json.dumps(report.as_dict(), indent=2) + "\n")
     _tell(args.input, output, report)
 
 
 def run_demo(args: argparse.Namespace) -> None:
-    """``patchlight demo``: the demo scenes as a .blend."""
-    _check_writable(args.output)
+    """``patchlight demo``: the demo scenes as .blend files."""
     with _blender():
-        from .blender import demo, files
+        from .blender import demo
 
-        demo.build_demo()
-        files.save_blend(args.output)
-    print(f"demo scenes -> {args.output}")
+        paths = demo.save_demo(args.folder)
+    for path in paths:
+        print(path)
 
 
 def run_picture(args: argparse.Namespace) -> None:
     """``patchlight picture``: a PNG of a baked .blend in which nothing but the bake gives light."""
-    _check_readable(args.input)
-    _check_writable(args.output)
-    with _blender():
+    with _blender() as bpy:
         from .blender import files, picture
 
+        for path in (args.output, args.lightmap):
+            if path:
+                files.require_writable(path)
         files.open_blend(args.input)
         picture.render(args.output)
-    print(f"picture of {args.input} -> {args.output}")
+        if args.lightmap:
+            image = next(iter(_lightmaps(bpy.context.scene.objects)), None)
+            if image is None:
+                raise CommandError(f"{args.input} holds no lightmap")
+            picture.save_lightmap_png(image, args.lightmap)
+    print(args.output)
 
 
-def _save(args, output, result, seconds):
-    """Write every file that was asked for; returns the report with all seconds in it."""
-    from .blender import files
+def _require_writable(output, args):
+    """Fail before the work rather than after it."""
+    from .blender.files import require_writable
 
-    with _timed(seconds, "save"):
-        if args.exr:
-            args.exr.mkdir(parents=True, exist_ok=True)
-            files.save_lightmaps(args.exr)
-        files.save_blend(output)
-    core_seconds = result.report.seconds
-    stages = {**core_seconds, **seconds}
-    seconds["bake"] = sum(stages.get(stage, 0.0) for stage in STAGES_OF_A_BAKE)
-    report = result.report.with_stages(seconds)
+    require_writable(output)
     if args.report:
-        args.report.write_text(json.dumps(report.as_dict(), indent=2) + "\n")
-    return report
+        require_writable(args.report)
+    if args.exr:
+        require_writable(args.exr / "lightmap.exr" if args.exr.is_dir() else args.exr)
+
+
+def _save_exr(prepared, folder):
+    import bpy
+
+    from .blender.files import save_exr
+
+    folder.mkdir(exist_ok=True)
+    for image in _lightmaps(bpy.data.objects[(target.name, None)] for target in prepared.targets):
+        save_exr(image, folder / f"{image.name}.exr")
+
+
+def _lightmaps(objects):
+    """The images that objects are baked into, each once."""
+    from .blender.write_lightmap import IMAGE_PROPERTY
+
+    return {ob[IMAGE_PROPERTY]: None for ob in objects if ob.get(IMAGE_PROPERTY) is not None}
 
 
 def _tell(source, output, report):
@@ -202,46 +220,6 @@ def _tell(source, output, report):
         print(f"patchlight: warning: {warning}", file=sys.stderr)
     seconds, error = report.seconds["bake"], report.estimated_error
     print(f"{source} -> {output}: baked in {seconds:.1f} s, estimated error {error:.3f}")
-
-
-# ---- checks before the work ----
-
-
-def _check_bake_arguments(args, output):
-    _check_readable(args.input)
-    _check_writable(output)
-    if args.report:
-        _check_writable(args.report)
-    if args.exr:
-        if args.target != "lightmap":
-            raise CommandError("--exr writes lightmaps: it needs --target lightmap")
-        _check_folder(args.exr if args.exr.exists() else args.exr.parent)
-    if args.subdivide is not None and not (args.target == "vertex" and args.subdivide > 0):
-        raise CommandError("--subdivide needs --target vertex and a length above 0 m")
-
-
-def _check_readable(path):
-    if not path.is_file():
-        raise CommandError(f"{path} {'is a folder' if path.is_dir() else 'does not exist'}")
-
-
-def _check_writable(path):
-    _check_folder(path.parent)
-    if path.is_dir():
-        raise CommandError(f"{path} is a folder")
-    if path.exists() and not os.access(path, os.W_OK):
-        raise CommandError(f"{path} cannot be written")
-
-
-def _check_folder(folder):
-    """Try it: permission bits do not tell about read-only mounts, nor what root may do."""
-    if not folder.is_dir():
-        raise CommandError(f"{folder} is not a folder that exists")
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise CommandError(f"folder {folder} cannot be written: {error.strerror}") from error
 
 
 # ---- around the work ----

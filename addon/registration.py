@@ -17,13 +17,12 @@ def register():
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     properties.add_to_types()
-    operators.add_handlers()
     _commands.append(bpy.utils.register_cli_command("patchlight", _run_command))
 
 
 def unregister():
     """Take everything away in the opposite order; a running bake is cancelled first."""
-    operators.remove_handlers()
+    operators.cancel_running()
     while _commands:
         bpy.utils.unregister_cli_command(_commands.pop())
     properties.remove_from_types()

@@ -1,7 +1,7 @@
 """Builds the Blender extension: `python native/build.py [PLATFORM ...]`, one validated zip per platform in dist/.
 
-The kernels are cross-compiled by Zig's C compiler, so that one machine makes all of them and the Linux one runs on every
-glibc that Blender runs on. With `--host-kernel` the kernel that is already in addon/core is packed instead.
+The kernels are cross-compiled by Zig's C compiler, so that one machine makes all of them and the Linux one runs on
+every glibc that Blender runs on. With `--host-kernel` the kernel that is already in addon/core is packed instead.
 """
 
 from __future__ import annotations
@@ -29,6 +29,22 @@ PLATFORMS = {
     "macos-arm64": ("aarch64-macos.11.0", "_kernel.abi3.so", ("macosx_13_0_arm64", "macosx_11_0_arm64")),
     "macos-x64": ("x86_64-macos.11.0", "_kernel.abi3.so", ("macosx_13_0_x86_64", "macosx_10_14_x86_64")),
 }
+# What the limited API needs to know about 64-bit Windows.
+WINDOWS_PYCONFIG = """
+#define MS_WINDOWS
+#define Py_ENABLE_SHARED 1
+#define HAVE_DECLSPEC_DLL 1
+#define HAVE_STDDEF_H 1
+#define HAVE_STDINT_H 1
+#define SIZEOF_VOID_P 8
+#define SIZEOF_SIZE_T 8
+#define SIZEOF_INT 4
+#define SIZEOF_LONG 4
+#define SIZEOF_LONG_LONG 8
+#define SIZEOF_WCHAR_T 2
+#define PY_SSIZE_T_MAX 9223372036854775807LL
+typedef long long Py_ssize_t;
+"""
 
 
 def main() -> None:
@@ -53,7 +69,8 @@ def build_zip(platform: str, output: Path, host_kernel: bool) -> Path:
     if host_kernel:
         shutil.copy(ROOT / "addon" / "core" / kernel, stage / "addon" / "core" / kernel)
     else:
-        compile_kernel(platform, stage / "addon" / "core" / kernel)
+        built = compile_kernel(platform, ROOT / "build" / f"kernel-{platform}" / kernel)
+        shutil.copy(built, stage / "addon" / "core" / kernel)
     version = _keep_wheels_of(platform, stage / "blender_manifest.toml")
     _extension_tool("build", "--source-dir", stage, "--output-dir", output, "--split-platforms")
     path = output / f"patchlight-{version}-{platform.replace('-', '_')}.zip"
@@ -61,8 +78,10 @@ def build_zip(platform: str, output: Path, host_kernel: bool) -> Path:
     return path
 
 
-def compile_kernel(platform: str, output: Path) -> None:
-    """Cross-compile the kernel with the flags and sources of pyproject.toml."""
+def compile_kernel(platform: str, output: Path) -> Path:
+    """Cross-compile the kernel with the flags and sources of pyproject.toml, in a folder of its own."""
+    shutil.rmtree(output.parent, ignore_errors=True)
+    output.parent.mkdir(parents=True)
     target = PLATFORMS[platform][0]
     extension = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["ext-modules"][0]
     command = _zig("cc", "-target", target, "-shared", "-s", "-o", output, *extension["extra-compile-args"])
@@ -72,37 +91,29 @@ def compile_kernel(platform: str, output: Path) -> None:
     # the host's Python headers: the limited API is the same in all of them, but not pyconfig.h
     headers = sysconfig.get_path("include")
     if platform.startswith("windows"):
-        command += _windows_python(output.parent / "windows", headers)
+        command += _windows_python(output.parent / "python", headers)
     elif platform.startswith("macos"):
         command += ["-isystem", headers, "-undefined", "dynamic_lookup"]
     else:
         command += ["-isystem", headers, "-fPIC", "-lm", "-ldl"]
     subprocess.run([str(word) for word in command], check=True)
-    shutil.rmtree(output.parent / "windows", ignore_errors=True)
-    output.with_suffix(".lib").unlink(missing_ok=True)
-    output.with_suffix(".pdb").unlink(missing_ok=True)
+    return output
 
 
 def _windows_python(folder, headers):
     """Arguments to compile and link against python3.dll: a pyconfig.h and an import library made here."""
-    folder.mkdir()
-    (folder / "pyconfig.h").write_text(
-        "#define MS_WINDOWS\n#define SIZEOF_VOID_P 8\n#define SIZEOF_SIZE_T 8\n#define SIZEOF_WCHAR_T 2\n"
-        "#define SIZEOF_LONG 4\n#define ALIGNOF_MAX_ALIGN_T 8\n#define HAVE_STDDEF_H 1\n#define HAVE_STDINT_H 1\n"
-        "typedef long long Py_ssize_t;\n#define PY_SSIZE_T_MAX 9223372036854775807LL\n"
-        "#define Py_ENABLE_SHARED 1\n#define HAVE_DECLSPEC_DLL 1\n"
-    )
-    for header in Path(headers).glob("*.h"):
-        if header.name != "pyconfig.h":
-            shutil.copy(header, folder)
+    shutil.copytree(headers, folder, ignore=shutil.ignore_patterns("internal"))
+    (folder / "pyconfig.h").write_text(WINDOWS_PYCONFIG)
     names = set()
-    for header in folder.glob("*.h"):
+    for header in folder.rglob("*.h"):
         names |= set(re.findall(r"\b_?Py\w+", header.read_text(errors="replace")))
     is_data = re.compile(r"PyExc_\w+|Py\w+_Type|_Py_\w+Struct")
     exports = "\n".join(f"  {name}{' DATA' if is_data.fullmatch(name) else ''}" for name in sorted(names))
     definition, library = folder / "python3.def", folder / "python3.lib"
     definition.write_text(f"LIBRARY python3.dll\nEXPORTS\n{exports}\n")
-    subprocess.run(_zig("dlltool", "-m", "i386:x86-64", "-D", "python3.dll", "-d", definition, "-l", library), check=True)
+    subprocess.run(
+        _zig("dlltool", "-m", "i386:x86-64", "-D", "python3.dll", "-d", definition, "-l", library), check=True
+    )
     return ["-isystem", folder, library]
 
 

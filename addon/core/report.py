@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+# what a bake costs once the file is open and has its UVs, to hold against other bakers
+STAGES_OF_A_BAKE = ("read", "texels", "solve", "gather", "write")
+
 
 @dataclass(frozen=True, slots=True)
 class Energy:
@@ -54,8 +57,10 @@ class Report:
     warnings: tuple[str, ...] = ()
 
     def with_stages(self, seconds: dict[str, float]) -> Report:
-        """A copy with further stages' seconds."""
-        return replace(self, seconds={**self.seconds, **seconds})
+        """A copy with further stages' seconds, and their sum over the stages of a bake as ``bake``."""
+        stages = {**self.seconds, **seconds}
+        stages["bake"] = sum(stages.get(stage, 0.0) for stage in STAGES_OF_A_BAKE)
+        return replace(self, seconds=stages)
 
     def with_warnings(self, warnings: tuple[str, ...]) -> Report:
         """A copy with further warnings."""

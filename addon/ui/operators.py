@@ -5,10 +5,15 @@ from __future__ import annotations
 import time
 
 import bpy
-from bpy.app.handlers import persistent
 
+from ..blender import bake_scene
+from ..core.bake import bake
+from ..core.scene import SceneError
 from ..core.settings import BakeCancelled, SettingsError
 from .job import BakeJob
+
+# Their message is meant for a person; anything else is a bug and keeps its traceback.
+EXPECTED_ERRORS = (BakeCancelled, SettingsError, SceneError, OSError, MemoryError)
 
 SECONDS_BETWEEN_POLLS = 0.1
 # While a bake runs these still reach Blender, so that one can look around; nothing that changes the scene does.
@@ -16,7 +21,6 @@ PASSED_ON = {
     *("MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM"),
     *("MOUSEMOVE", "INBETWEEN_MOUSEMOVE", "TIMER", "TIMER_REPORT", "TIMER_REGION", "WINDOW_DEACTIVATE", "NDOF_MOTION"),
 }
-STAGES_OF_A_BAKE = ("read", "texels", "solve", "gather", "write")
 
 # The one bake that runs in this Blender, or None.
 _running: PATCHLIGHT_OT_bake | None = None
@@ -74,9 +78,6 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
     def _prepare(self, context):
         """Read the scene and make the job; False after an error, which is reported."""
         global _running
-        from ..blender import bake_scene
-        from ..core.bake import bake
-
         self._timer, self._is_abandoned = None, False
         began = time.perf_counter()
         try:
@@ -85,7 +86,7 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
             settings = scene.patchlight.to_settings(metres_per_unit)
             subdivide = scene.patchlight.subdivide_metres(metres_per_unit)
             self._prepared = bake_scene.prepare(scene, settings, _names_to_bake(context), subdivide)
-        except _expected_errors() as error:
+        except EXPECTED_ERRORS as error:
             self.report({"ERROR"}, _sentence(error))
             return False
         self._read_seconds = time.perf_counter() - began
@@ -97,8 +98,6 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
 
     def _end(self, context):
         """Write the result, or discard it, and tell how it went."""
-        from ..blender import bake_scene
-
         self._leave(context)
         if self._is_abandoned:
             return {"CANCELLED"}
@@ -109,21 +108,20 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
                 bake_scene.write(self._prepared, self._job.result)
                 self._tell(context, time.perf_counter() - began)
                 return {"FINISHED"}
-            except _expected_errors() as failure:
+            except EXPECTED_ERRORS as failure:
                 error = failure
         bake_scene.discard(self._prepared)
         if isinstance(error, BakeCancelled):
             self.report({"INFO"}, "Bake cancelled, nothing changed")
-        elif isinstance(error, _expected_errors()):
+        elif isinstance(error, EXPECTED_ERRORS):
             self.report({"ERROR"}, _sentence(error))
         else:
             raise error
         return {"CANCELLED"}
 
     def _tell(self, context, write_seconds):
-        report = self._job.result.report
-        stages = {**report.seconds, "read": self._read_seconds, "write": write_seconds}
-        seconds = sum(stages.get(stage, 0.0) for stage in STAGES_OF_A_BAKE)
+        report = self._job.result.report.with_stages({"read": self._read_seconds, "write": write_seconds})
+        seconds = report.seconds["bake"]
         for warning in report.warnings:
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, f"Baked in {seconds:.1f} s, estimated error {report.estimated_error:.3f}")
@@ -152,10 +150,8 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
             _redraw_sidebars(context.window_manager)
 
     def abandon(self):
-        """The scene under the bake is about to go: end the job and touch nothing of the scene again."""
+        """Nobody will see the end of this bake: stop it and forget it."""
         global _running
-        from ..blender import bake_scene
-
         if self._is_abandoned:
             return
         self._is_abandoned = True
@@ -166,41 +162,16 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
         bpy.context.window_manager.patchlight.is_baking = False
 
 
-@persistent
-def abandon_running(*_args):
-    """Called before another file is loaded and before an undo step: both take away what a running bake has read."""
+def cancel_running():
+    """End a bake that still runs and wait for its thread; for when the add-on goes."""
     if _running is not None:
         _running.abandon()
-
-
-def add_handlers():
-    """End a running bake before anything that it could not survive."""
-    for handlers in _handlers_to_watch():
-        handlers.append(abandon_running)
-
-
-def remove_handlers():
-    """Stop watching; a bake that still runs is ended."""
-    abandon_running()
-    for handlers in _handlers_to_watch():
-        handlers.remove(abandon_running)
-
-
-def _handlers_to_watch():
-    return (bpy.app.handlers.load_pre, bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre)
 
 
 def _names_to_bake(context):
     if not context.scene.patchlight.only_selected:
         return None
     return [ob.name for ob in context.selected_objects]
-
-
-def _expected_errors():
-    """Exceptions whose message is meant for a person; their modules import NumPy, so they are looked up late."""
-    from ..core.scene import SceneError
-
-    return (BakeCancelled, SettingsError, SceneError, OSError, MemoryError)
 
 
 def _sentence(error):
