@@ -14,6 +14,7 @@ from mathutils import Matrix
 
 from .demo_room import build_room
 from .demo_shapes import add_object, diffuse, shape
+from .files import save_blend
 
 __all__ = ["build_cornell_box", "build_demo", "build_room", "save_demo"]
 
@@ -123,5 +124,5 @@ def save_demo(folder):
         bpy.ops.wm.read_factory_settings(use_empty=True)
         build()
         paths.append(folder / f"{name}.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=str(paths[-1]), compress=True, check_existing=False)
+        save_blend(paths[-1])
     return tuple(paths)

@@ -38,7 +38,7 @@ def add_sofa(position, wood):
     legs = [leg.moved((x + dx, y + dy, z + GAP)) for dx in (-0.7, 0.7) for dy in (-0.32, 0.32)]
     add_object("sofa legs", joined(*legs), wood)
     seats = [
-        rounded_box((0.772, 0.60, 0.15), 0.05, flat_steps=4, bulge=0.02).moved((x + side * 0.388, y - 0.112, z + 0.372))
+        rounded_box((0.772, 0.60, 0.15), 0.05, flat_steps=3, bulge=0.02).moved((x + side * 0.388, y - 0.112, z + 0.372))
         for side in (-1, 1)
     ]
     add_object("sofa seat cushions", joined(*seats), cloth)
@@ -50,7 +50,7 @@ def add_sofa(position, wood):
 
 
 def _leaning_pillow(turn_deg):
-    flat = rounded_box((0.42, 0.42, 0.07), 0.034, flat_steps=4, bulge=0.045)
+    flat = rounded_box((0.42, 0.42, 0.07), 0.034, flat_steps=3, bulge=0.045)
     angle = np.radians(68)
     cos, sin = np.cos(angle), np.sin(angle)
     upright = flat.points @ np.array([[1, 0, 0], [0, cos, sin], [0, -sin, cos]])
@@ -88,7 +88,7 @@ def _vase():
         (0.042, 0.225), (0.034, 0.255), (0.037, 0.285), (0.048, 0.305),
     ]  # fmt: skip
     inside = [(0.044, 0.306), (0.033, 0.284), (0.030, 0.255), (0.038, 0.225), (0.05, 0.19), (0.0, 0.16)]
-    return lathe(outside + inside, 40, flat=(0,))
+    return lathe(outside + inside, 36, flat=(0,))
 
 
 def add_dining_set(position, wood):

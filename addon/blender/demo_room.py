@@ -9,7 +9,7 @@ import numpy as np
 from mathutils import Vector
 
 from .demo_furniture import add_bookcase, add_dining_set, add_lamp, add_plant, add_sofa, add_table_and_rug
-from .demo_shapes import add_object, add_planar_uvs, box, cylinder, diffuse, joined, panel, shape, sphere
+from .demo_shapes import Shape, add_object, add_planar_uvs, box, cylinder, diffuse, joined, panel, shape, sphere
 from .demo_textures import packed_image, painting, planks
 
 WIDTH, DEPTH, HEIGHT = 4.2, 5.0, 2.7  # [m] inside: x from the window wall, y from the camera's wall, z
@@ -54,46 +54,44 @@ def build_room():
 
 
 def _add_shell(palette):
-    """Walls with two faces: the rooms' own, one object each, and a facade around them."""
+    """Floor, ceiling and walls, one object each, facing the room; the window's wall is solid and has a facade too."""
     terracotta = diffuse("terracotta", (0.50, 0.19, 0.115))
     boards = diffuse("oak boards", (0.40, 0.25, 0.14), packed_image("oak boards", planks()))
     w, d, h = WIDTH, DEPTH, HEIGHT
-    y0, z0, y1, z1 = WINDOW
-    # the wall x = 0 is seen from inside along -x: u runs to smaller y
-    opening = ((d - y1) / d, z0 / h, (d - y0) / d, z1 / h)
+    up = (0, 0, h)
 
     floor = add_object("floor", panel((0, 0, 0), (w, 0, 0), (0, d, 0)), boards)
     add_planar_uvs(floor, (0, 0, 0), (d, 0, 0), (0, d, 0))
     add_object("ceiling", panel((0, d, h), (w, 0, 0), (0, -d, 0)), palette.white)
-    add_object("back wall", panel((w, d, 0), (-w, 0, 0), (0, 0, h)), palette.plaster)
-    add_object("right wall", panel((w, 0, 0), (0, d, 0), (0, 0, h)), terracotta)
-    add_object("camera wall", panel((0, 0, 0), (w, 0, 0), (0, 0, h)), palette.plaster)
-    window_wall = joined(panel((0, d, 0), (0, -d, 0), (0, 0, h), opening), _reveal())
-    add_object("window wall", window_wall, palette.plaster)
+    add_object("back wall", panel((0, d, 0), (w, 0, 0), up), palette.plaster)
+    add_object("right wall", panel((w, d, 0), (0, -d, 0), up), terracotta)
+    add_object("camera wall", panel((w, 0, 0), (-w, 0, 0), up), palette.plaster)
+    y0, z0, y1, z1 = WINDOW
+    inside = panel((0, 0, 0), (0, d, 0), up, (y0 / d, z0 / h, y1 / d, z1 / h))
+    add_object("window wall", joined(inside, _reveal()), palette.plaster)
     add_object("facade", _facade(), diffuse("render", (0.60, 0.58, 0.54)))
 
 
 def _reveal():
     """The four sides of the opening, from the room to the open air; they face its middle."""
     y0, z0, y1, z1 = WINDOW
-    x0, x1 = -WALL, 0.0
     rim = [(y0, z0), (y1, z0), (y1, z1), (y0, z1)]
-    points = [(x, y, z) for x in (x0, x1) for y, z in rim]
+    points = [(x, y, z) for x in (-WALL, 0.0) for y, z in rim]
     return shape(points, [(i, 4 + i, 4 + (i + 1) % 4, (i + 1) % 4) for i in range(4)])
 
 
 def _facade():
-    """The outside of the house: a box one wall thickness larger, with the window's opening."""
-    low, high = np.full(3, -WALL), np.array([WIDTH, DEPTH, HEIGHT]) + WALL
-    w, d, h = high - low
-    y0, z0, y1, z1 = np.array(WINDOW) + WALL
+    """The outside of the window's wall and its four narrow ends."""
+    d, h = DEPTH, HEIGHT
+    y0, z0, y1, z1 = WINDOW
+    thick, along, up = (WALL, 0, 0), (0, d, 0), (0, 0, h)
+    opening = ((d - y1) / d, z0 / h, (d - y0) / d, z1 / h)
     return joined(
-        panel((low[0], low[1], high[2]), (w, 0, 0), (0, d, 0)),
-        panel((low[0], high[1], low[2]), (w, 0, 0), (0, -d, 0)),
-        panel((low[0], low[1], low[2]), (w, 0, 0), (0, 0, h)),
-        panel((high[0], high[1], low[2]), (-w, 0, 0), (0, 0, h)),
-        panel((high[0], low[1], low[2]), (0, d, 0), (0, 0, h)),
-        panel((low[0], high[1], low[2]), (0, -d, 0), (0, 0, h), ((d - y1) / d, z0 / h, (d - y0) / d, z1 / h)),
+        panel((-WALL, d, 0), (0, -d, 0), up, opening),
+        panel((-WALL, 0, 0), thick, up),
+        panel((0, d, 0), (-WALL, 0, 0), up),
+        panel((-WALL, 0, h), thick, along),
+        panel((0, 0, 0), (-WALL, 0, 0), along),
     )
 
 
@@ -133,7 +131,7 @@ def _add_curtains(palette):
     along_y = rod.points[:, [1, 2, 0]] + (0.085, y0 - 0.5, z1 + 0.165)
     knobs = [sphere(0.022, 16, 8).moved((0.085, y, z1 + 0.165)) for y in (y0 - 0.5, y1 + 0.5)]
     holders = [box((GAP, y - 0.008, z1 + 0.157), (0.074, y + 0.008, z1 + 0.173)) for y in (y0 - 0.46, y1 + 0.46)]
-    rod = type(rod)(along_y, rod.faces, rod.smooth, rod.slots)
+    rod = Shape(along_y, rod.faces, rod.smooth, rod.slots)
     add_object("curtain rod", joined(rod, *knobs, *holders), palette.metal)
 
 
@@ -145,13 +143,13 @@ def _folds(start, stop, low, high, folds=6, steps=72):
     outline = np.concatenate([np.stack([room_side, y], 1), np.stack([wall_side, y], 1)[::-1]])
     count = len(outline)
     points = np.concatenate([np.insert(outline, 2, z, axis=1) for z in (low, high)])
-    # walking the outline with y rising on the room's side keeps the cloth to the left, so outside is at the right
-    sides = [((i + 1) % count, i, count + i, count + (i + 1) % count) for i in range(count)]
-    strips = [(i, i + 1, count - 2 - i, count - 1 - i) for i in range(steps)]
-    tops = [tuple(count + corner for corner in reversed(strip)) for strip in strips]
-    cloth = shape(points, sides, smooth=True)
-    hems = shape(points, strips + tops)
-    return type(cloth)(points, cloth.faces + hems.faces, cloth.smooth + hems.smooth, cloth.slots + hems.slots)
+    # the outline runs counter-clockwise seen from above: along the room's side with y, back along the wall's
+    sides = [(i, (i + 1) % count, count + (i + 1) % count, count + i) for i in range(count)]
+    hems = [(count - 1 - i, count - 2 - i, i + 1, i) for i in range(steps)]
+    hems += [tuple(count + corner for corner in reversed(hem)) for hem in hems]
+    ends = {steps, count - 1}
+    smooth = [i not in ends for i in range(count)] + [False] * len(hems)
+    return Shape(points, sides + hems, smooth, [0] * len(smooth))
 
 
 def _add_door(palette):

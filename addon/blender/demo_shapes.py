@@ -100,34 +100,32 @@ def _grid_faces(start, rows, columns, flip=False):
 def lathe(profile, segments=24, flat=()):
     """A profile of (radius, z) rows turned about the z axis; outside lies to the right of its direction.
 
-    The profile may start and end on the axis. ``flat`` names the profile's edges that come out faceted with sharp rims.
+    The profile may start and end on the axis. ``flat`` names the profile's edges whose faces are flat, with sharp rims.
     """
     profile = np.asarray(profile, float)
-    angles = np.arange(segments) * (2 * np.pi / segments)
-    rings = np.stack(
-        [
-            profile[:, :1] * np.cos(angles),
-            profile[:, :1] * np.sin(angles),
-            np.broadcast_to(profile[:, 1:], (len(profile), segments)),
-        ],
-        axis=-1,
-    )
+    edge_count = len(profile) - 1
+    # a profile that comes back to its start shares the first ring
+    ring_count = edge_count if np.array_equal(profile[0], profile[-1]) else len(profile)
     faces, smooth = [], []
-    for edge in range(len(profile) - 1):
+    for edge in range(edge_count):
+        a, b = edge * segments, (edge + 1) % ring_count * segments
         for i in range(segments):
             j = (i + 1) % segments
-            a, b = edge * segments, (edge + 1) * segments
-            corners = [a + i, a + j, b + j, b + i]
             if profile[edge, 0] == 0:
-                corners.pop(1)
-                corners[0] = a
+                faces.append((a, b + j, b + i))
             elif profile[edge + 1, 0] == 0:
-                corners.pop(2)
-                corners[2] = b
-            faces.append(tuple(corners))
+                faces.append((a + i, a + j, b))
+            else:
+                faces.append((a + i, a + j, b + j, b + i))
             smooth.append(edge not in flat)
-    turned = _without_unused(rings.reshape(-1, 3), faces)
+    turned = _without_unused(_rings(profile[:ring_count], segments), faces)
     return Shape(turned.points, turned.faces, smooth, [0] * len(faces))
+
+
+def _rings(profile, segments):
+    angles = np.arange(segments) * (2 * np.pi / segments)
+    radius, height = profile[:, :1], np.broadcast_to(profile[:, 1:], (len(profile), segments))
+    return np.stack([radius * np.cos(angles), radius * np.sin(angles), height], axis=-1).reshape(-1, 3)
 
 
 def _without_unused(points, faces):

@@ -1,0 +1,188 @@
+"""A picture of a baked scene, lit by nothing but the bake.
+
+Everything happens in a scene of its own, made of copies: the scene that is shown, its materials, lights and world are
+not touched, and the copies are gone afterwards. No light is copied; every surface only emits what the bake and its own
+material say; no ray bounces. So whatever is bright in the picture is bright in the bake.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..core.scene import SceneError
+from .picture_materials import Light, LitMaterials
+from .read_mesh import LIGHTMAP_LAYER
+from .visibility import Visibility
+from .write_lightmap import IMAGE_PROPERTY, RECT_PROPERTY
+from .write_vertex_colours import ATTRIBUTE
+
+MIDDLE_GREY = 0.26  # radiance that the median of the picture is exposed to: a light room, not a grey card
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def render(path_png, width=960, height=540, samples=16, view_transform="AgX", exposure=None):
+    """Render the current scene's bake through its camera into an 8-bit PNG.
+
+    Parameters
+    ----------
+    samples : rays per pixel; they only smooth edges, as nothing here is random but the place within the pixel
+    view_transform : of Blender's colour management, e.g. "AgX", "Standard", "Raw"
+    exposure : stops; None = chosen so that the median of the picture becomes a middle grey
+    """
+    source = bpy.context.scene
+    if source.camera is None:
+        raise SceneError(f"scene {source.name} has no camera")
+    copy = _SceneCopy(source)
+    try:
+        scene = copy.scene
+        _set_up(scene, view_transform)
+        if exposure is None:
+            exposure = _automatic_exposure(scene, width, height)
+        scene.view_settings.exposure = exposure
+        _render(scene, path_png, width, height, samples, "PNG")
+    finally:
+        copy.remove()
+
+
+class _SceneCopy:
+    """A scene of its own that shows every renderable mesh of another one, wearing lit materials."""
+
+    def __init__(self, source):
+        self._materials = LitMaterials()
+        self._meshes = []
+        self._objects = []
+        self.scene = bpy.data.scenes.new(f"{source.name} picture")
+        self.scene.camera = source.camera
+        self.scene.world = source.world
+        self.scene.collection.objects.link(source.camera)
+        for shown in self._evaluated_meshes():
+            self._add(*shown)
+
+    def _evaluated_meshes(self):
+        """(object, mesh copy, world matrix, materials) of all that a render shows; the iterator's entries die."""
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        visibility = Visibility(bpy.context.view_layer)
+        shown = []
+        for instance in depsgraph.object_instances:
+            if instance.object.type != "MESH" or not visibility.shows(instance):
+                continue
+            evaluated = instance.object
+            mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
+            self._meshes.append(mesh)
+            materials = [slot.material.original if slot.material else None for slot in evaluated.material_slots]
+            shown.append((evaluated.original, mesh, instance.matrix_world.copy(), materials or [None]))
+        return shown
+
+    def _add(self, original, mesh, matrix, materials):
+        light = _light_of(original, mesh)
+        for index, material in enumerate(materials):
+            lit = self._materials.lit(material, light)
+            if index < len(mesh.materials):
+                mesh.materials[index] = lit
+            else:
+                mesh.materials.append(lit)
+        obj = bpy.data.objects.new(original.name, mesh)
+        obj.matrix_world = matrix
+        self.scene.collection.objects.link(obj)
+        self._objects.append(obj)
+
+    def remove(self):
+        """Take everything out of the file that was put in."""
+        bpy.data.scenes.remove(self.scene)
+        for obj in self._objects:
+            bpy.data.objects.remove(obj)
+        for mesh in self._meshes:
+            bpy.data.meshes.remove(mesh)
+        self._materials.remove()
+
+
+def _light_of(obj, mesh):
+    """Where the object's baked light is; its place in a shared atlas goes into the mesh copy's UVs."""
+    image = obj.get(IMAGE_PROPERTY)
+    layer = mesh.uv_layers.get(LIGHTMAP_LAYER)
+    if image is not None and layer is not None:
+        rect = obj.get(RECT_PROPERTY)
+        if rect is not None:
+            uvs = np.empty(len(mesh.loops) * 2, np.float32)
+            layer.uv.foreach_get("vector", uvs)
+            uvs = uvs.reshape(-1, 2) * np.array(rect[:2]) + np.array(rect[2:])
+            layer.uv.foreach_set("vector", uvs.astype(np.float32).ravel())
+        return Light(image=image)
+    if ATTRIBUTE in mesh.color_attributes:
+        return Light(attribute=ATTRIBUTE)
+    return Light()
+
+
+def _set_up(scene, view_transform):
+    scene.render.engine = "CYCLES"
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.max_bounces = 0
+    cycles.transparent_max_bounces = 32
+    cycles.use_adaptive_sampling = False
+    cycles.use_denoising = False
+    scene.view_settings.view_transform = view_transform
+    scene.view_settings.look = "AgX - Medium High Contrast" if view_transform == "AgX" else "None"
+    scene.view_settings.gamma = 1.0
+    scene.render.use_compositing = False
+    scene.render.use_sequencer = False
+
+
+def _render(scene, path, width, height, samples, file_format):
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    scene.render.resolution_percentage = 100
+    scene.cycles.samples = samples
+    scene.render.image_settings.file_format = file_format
+    scene.render.image_settings.color_mode = "RGB"
+    scene.render.image_settings.color_depth = "32" if file_format == "OPEN_EXR" else "8"
+    scene.render.use_file_extension = False
+    scene.render.filepath = str(Path(path).resolve())
+    bpy.ops.render.render(write_still=True, scene=scene.name)
+
+
+def _automatic_exposure(scene, width, height):
+    """Stops that bring the median luminance of the picture to a middle grey."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = str(Path(folder) / "small.exr")
+        _render(scene, path, max(width // 4, 1), max(height // 4, 1), 4, "OPEN_EXR")
+        image = bpy.data.images.load(path)
+        pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+        image.pixels.foreach_get(pixels)
+        bpy.data.images.remove(image)
+    luminance = pixels.reshape(-1, 4)[:, :3] @ LUMINANCE
+    lit = luminance[luminance > 0]
+    return float(np.log2(MIDDLE_GREY / np.median(lit))) if len(lit) else 0.0
+
+
+def save_lightmap_png(image, path):
+    """Write a lightmap as an 8-bit PNG to look at: light and dark compressed, hue kept.
+
+    The brightness L / (1 + L), with L = 1 at the median of the lit texels, shows shadow and sun patch together.
+    """
+    width, height = image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    light = np.nan_to_num(np.maximum(pixels.reshape(-1, 4)[:, :3], 0))
+    luminance = light @ LUMINANCE
+    lit = luminance[luminance > 0]
+    scaled = light / (np.median(lit) if len(lit) else 1.0)
+    shown = scaled / (1 + scaled @ LUMINANCE)[:, None]
+
+    rgba = np.ones((width * height, 4), np.float32)
+    rgba[:, :3] = _srgb(np.clip(shown, 0, 1))
+    png = bpy.data.images.new("lightmap to look at", width, height)
+    try:
+        png.pixels.foreach_set(rgba.ravel())
+        png.file_format = "PNG"
+        png.filepath_raw = str(Path(path).resolve())
+        png.save()
+    finally:
+        bpy.data.images.remove(png)
+
+
+def _srgb(linear):
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)

@@ -1,0 +1,154 @@
+"""Materials that show a bake: each shader becomes the light that it sends back, base colour x (E / pi) + emission.
+
+Works on private copies of the materials, node by node: mixes, textures and groups stay as the artist made them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+
+from .read_materials import DIFFUSE, GLOSSY, PASSING
+from .read_mesh import LIGHTMAP_LAYER
+
+
+@dataclass(frozen=True, slots=True)
+class Light:
+    """Where the E / pi of an object is stored: a lightmap image, or a colour attribute, or nowhere."""
+
+    image: bpy.types.Image | None = None
+    attribute: str | None = None
+
+    @property
+    def key(self):
+        return (self.image.name if self.image else None, self.attribute)
+
+
+class LitMaterials:
+    """Copies of materials, one for each pair of material and light; ``remove()`` takes them out of the file again."""
+
+    def __init__(self):
+        self._made = {}
+        self._groups = []
+
+    def lit(self, material, light: Light):
+        """The material (or None) as it looks under a light."""
+        key = (material.name_full if material else None, light.key)
+        if key not in self._made:
+            self._made[key] = self._build(material, light)
+        return self._made[key]
+
+    def remove(self):
+        for made in self._made.values():
+            bpy.data.materials.remove(made)
+        for group in self._groups:
+            bpy.data.node_groups.remove(group)
+        self._made, self._groups = {}, []
+
+    def _build(self, material, light):
+        if material is None or not material.use_nodes:
+            colour = (0.8, 0.8, 0.8) if material is None else material.diffuse_color[:3]
+            return _plain(colour, light)
+        copy = material.copy()
+        self._convert(copy.node_tree, light)
+        return copy
+
+    def _convert(self, tree, light):
+        for node in list(tree.nodes):
+            if node.type == "GROUP" and node.node_tree is not None:
+                node.node_tree = node.node_tree.copy()
+                self._groups.append(node.node_tree)
+                self._convert(node.node_tree, light)
+            elif node.type == "BSDF_PRINCIPLED":
+                _replace(tree, node, _principled(tree, node, light))
+            elif node.type in DIFFUSE or node.type in GLOSSY:
+                colour = node.inputs[DIFFUSE.get(node.type) or GLOSSY[node.type]]
+                _replace(tree, node, _reflected(tree, colour, light))
+            elif node.type in PASSING:
+                _replace(tree, node, _transparent(tree, node.inputs["Color"]))
+
+
+def _plain(colour, light):
+    made = bpy.data.materials.new("plain")
+    made.use_nodes = True
+    tree = made.node_tree
+    tree.nodes.clear()
+    shader = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    shader.inputs["Color"].default_value = (*colour, 1.0)
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    tree.links.new(_reflected(tree, shader.inputs["Color"], light), output.inputs["Surface"])
+    return made
+
+
+def _replace(tree, node, shader):
+    """Let everything that ``node`` feeds be fed by ``shader``."""
+    for link in list(node.outputs[0].links):
+        tree.links.new(shader, link.to_socket)
+    tree.nodes.remove(node)
+
+
+def _principled(tree, node, light):
+    base = node.inputs["Base Color"]
+    reflected = _reflected(tree, base, light)
+    # the reader of materials draws the same line: light passes from a transmission of 0.5 on
+    if node.inputs["Transmission Weight"].default_value >= 0.5:
+        reflected = _transparent(tree, base)
+    emitted = tree.nodes.new("ShaderNodeEmission")
+    _feed(tree, node.inputs["Emission Color"], emitted.inputs["Color"])
+    _feed(tree, node.inputs["Emission Strength"], emitted.inputs["Strength"])
+    both = tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(reflected, both.inputs[0])
+    tree.links.new(emitted.outputs[0], both.inputs[1])
+    cut_out = tree.nodes.new("ShaderNodeMixShader")
+    _feed(tree, node.inputs["Alpha"], cut_out.inputs[0])
+    tree.links.new(tree.nodes.new("ShaderNodeBsdfTransparent").outputs[0], cut_out.inputs[1])
+    tree.links.new(both.outputs[0], cut_out.inputs[2])
+    return cut_out.outputs[0]
+
+
+def _reflected(tree, colour, light):
+    """An emission of colour x light."""
+    product = tree.nodes.new("ShaderNodeVectorMath")
+    product.operation = "MULTIPLY"
+    _feed(tree, colour, product.inputs[0])
+    stored = _stored_light(tree, light)
+    if stored is None:
+        product.inputs[1].default_value = (0.0, 0.0, 0.0)
+    else:
+        tree.links.new(stored, product.inputs[1])
+    emission = tree.nodes.new("ShaderNodeEmission")
+    tree.links.new(product.outputs[0], emission.inputs["Color"])
+    return emission.outputs[0]
+
+
+def _stored_light(tree, light):
+    if light.image is not None:
+        uvs = tree.nodes.new("ShaderNodeUVMap")
+        uvs.uv_map = LIGHTMAP_LAYER
+        lookup = tree.nodes.new("ShaderNodeTexImage")
+        lookup.image = light.image
+        lookup.extension = "EXTEND"
+        tree.links.new(uvs.outputs["UV"], lookup.inputs["Vector"])
+        return lookup.outputs["Color"]
+    if light.attribute is not None:
+        attribute = tree.nodes.new("ShaderNodeAttribute")
+        attribute.attribute_name = light.attribute
+        return attribute.outputs["Color"]
+    return None
+
+
+def _transparent(tree, colour):
+    shader = tree.nodes.new("ShaderNodeBsdfTransparent")
+    _feed(tree, colour, shader.inputs["Color"])
+    return shader.outputs[0]
+
+
+def _feed(tree, source, target):
+    """Give ``target`` the link or the value of the input ``source``."""
+    if source.is_linked:
+        tree.links.new(source.links[0].from_socket, target)
+    elif hasattr(target.default_value, "__len__"):
+        target.default_value = tuple(source.default_value)[: len(target.default_value)]
+    else:
+        target.default_value = source.default_value
