@@ -47,6 +47,18 @@ kernel: $(VENV)/.installed $(KERNEL)
 
 # ---- the two commands ----
 
+DEMOS := room cornell
+
+bake: kernel
+	$(BIN)/patchlight demo $(OUT)
+	@set -e; for demo in $(DEMOS); do \
+	    $(BIN)/patchlight bake $(OUT)/$$demo.blend --output $(OUT)/$${demo}_baked.blend --report $(OUT)/$$demo.json \
+	        --exr $(OUT) $(BAKE_OPTIONS); \
+	    $(BIN)/patchlight picture $(OUT)/$${demo}_baked.blend $(OUT)/$$demo.png --lightmap $(OUT)/$${demo}_lightmap.png; \
+	done
+	@echo; echo "Pictures lit by nothing but the bake, and the lightmaps they show:"
+	@for demo in $(DEMOS); do echo "  $(OUT)/$$demo.png   $(OUT)/$${demo}_lightmap.png"; done
+
 test: kernel
 	$(BIN)/python -m pytest
 

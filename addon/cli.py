@@ -104,7 +104,7 @@ def _add_bake(commands):
     add("--seed", type=int, default=DEFAULTS.seed, help="the same seed gives the same bytes (default: %(default)s)")
     add("--threads", type=int, default=DEFAULTS.threads, metavar="N", help="0 = all cores (default)")
     add("--report", type=Path, metavar="OUT.json", help="write seconds, rays, error and warnings as JSON")
-    add("--exr", type=Path, metavar="DIR", help="write the lightmaps as OpenEXR, too")
+    add("--exr", type=Path, metavar="DIR", help="write the lightmap as DIR/OUT.exr, too")
 
 
 def settings_from(args: argparse.Namespace) -> BakeSettings:
@@ -151,7 +151,7 @@ def run_bake(args: argparse.Namespace) -> None:
                 bake_scene.write(prepared, result)
             with _timed(seconds, "save"):
                 if args.exr:
-                    _save_exr(prepared, args.exr)
+                    _save_exr(prepared, args.exr / f"{output.stem}.exr")
                 files.save_blend(output)
             report = result.report.with_stages(seconds)
             if args.report:
@@ -180,7 +180,7 @@ def run_picture(args: argparse.Namespace) -> None:
         files.open_blend(args.input)
         picture.render(args.output)
         if args.lightmap:
-            image = next(iter(_lightmaps(bpy.context.scene.objects)), None)
+            image = _lightmap(bpy.context.scene.objects)
             if image is None:
                 raise CommandError(f"{args.input} holds no lightmap")
             picture.save_lightmap_png(image, args.lightmap)
@@ -198,21 +198,20 @@ def _require_writable(output, args):
         require_writable(args.exr / "lightmap.exr" if args.exr.is_dir() else args.exr)
 
 
-def _save_exr(prepared, folder):
+def _save_exr(prepared, path):
     import bpy
 
     from .blender.files import save_exr
 
-    folder.mkdir(exist_ok=True)
-    for image in _lightmaps(bpy.data.objects[(target.name, None)] for target in prepared.targets):
-        save_exr(image, folder / f"{image.name}.exr")
+    path.parent.mkdir(exist_ok=True)
+    save_exr(_lightmap(bpy.data.objects[(target.name, None)] for target in prepared.targets), path)
 
 
-def _lightmaps(objects):
-    """The images that objects are baked into, each once."""
+def _lightmap(objects):
+    """The image that these objects are baked into: all targets of a bake share one; None without a bake."""
     from .blender.write_lightmap import IMAGE_PROPERTY
 
-    return {ob[IMAGE_PROPERTY]: None for ob in objects if ob.get(IMAGE_PROPERTY) is not None}
+    return next((ob[IMAGE_PROPERTY] for ob in objects if ob.get(IMAGE_PROPERTY) is not None), None)
 
 
 def _tell(source, output, report):
