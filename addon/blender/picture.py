@@ -13,7 +13,6 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core.scene import SceneError
 from .picture_materials import Light, LitMaterials
 from .read_mesh import LIGHTMAP_LAYER
 from .visibility import Visibility
@@ -22,6 +21,10 @@ from .write_vertex_colours import ATTRIBUTE
 
 MIDDLE_GREY = 0.26  # radiance that the median of the picture is exposed to: a light room, not a grey card
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+class PictureError(ValueError):
+    """A scene that cannot be shown; the message says what is missing."""
 
 
 def render(path_png, width=960, height=540, samples=16, view_transform="AgX", exposure=None):
@@ -35,7 +38,7 @@ def render(path_png, width=960, height=540, samples=16, view_transform="AgX", ex
     """
     source = bpy.context.scene
     if source.camera is None:
-        raise SceneError(f"scene {source.name} has no camera")
+        raise PictureError(f"scene {source.name} has no camera")
     copy = _SceneCopy(source)
     try:
         scene = copy.scene

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from addon.blender import demo, picture
-from addon.core.scene import SceneError
 
 # Levels of an 8-bit PNG: half a one is rounding, one is the reach of Blender's triangular dither
 PNG_LEVELS = 1.5 / 255
@@ -137,7 +136,7 @@ def test_automatic_exposure_brings_the_median_to_grey_at_any_brightness(wall, tm
 
 def test_a_scene_without_camera_is_refused_by_name(wall, tmp_path):
     bpy.context.scene.camera = None
-    with pytest.raises(SceneError, match="Scene has no camera"):
+    with pytest.raises(picture.PictureError, match="Scene has no camera"):
         picture.render(tmp_path / "picture.png")
 
 
