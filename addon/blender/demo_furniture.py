@@ -38,7 +38,7 @@ def add_sofa(position, wood):
     legs = [leg.moved((x + dx, y + dy, z + GAP)) for dx in (-0.7, 0.7) for dy in (-0.32, 0.32)]
     add_object("sofa legs", joined(*legs), wood)
     seats = [
-        rounded_box((0.772, 0.60, 0.15), 0.05, flat_steps=3, bulge=0.02).moved((x + side * 0.388, y - 0.112, z + 0.372))
+        rounded_box((0.772, 0.60, 0.15), 0.05, flat_steps=3, bulge=0.02).moved((x + side * 0.388, y - 0.112, z + 0.378))
         for side in (-1, 1)
     ]
     add_object("sofa seat cushions", joined(*seats), cloth)
@@ -60,7 +60,7 @@ def _leaning_pillow(turn_deg):
 def add_table_and_rug(position, wood):
     """A woven rug and on it a round coffee table with a vase, a bowl of two oranges and a book."""
     x, y, z = position
-    size = (2.30, 1.65, 0.012)
+    size = (2.10, 1.65, 0.012)
     low = np.array([x - size[0] / 2, y - size[1] / 2, z + GAP])
     carpet = add_object("rug", box(low, low + size), diffuse("rug", (0.4, 0.4, 0.4), packed_image("rug", rug())))
     add_planar_uvs(carpet, low, (size[0], 0, 0), (0, size[1], 0))

@@ -44,9 +44,9 @@ def build_room():
     _add_picture(palette)
     _add_skirting(palette)
     add_sofa((1.55, DEPTH - 0.50, 0.0), palette.oak)
-    add_table_and_rug((1.75, 3.05, 0.0), palette.oak)
+    add_table_and_rug((2.06, 3.20, 0.0), palette.oak)
     add_dining_set((0.62, 2.00, 0.0), palette.oak)
-    add_bookcase((WIDTH - GAP, 3.65, 0.0), palette.white)
+    add_bookcase((WIDTH - 0.016, 3.65, 0.0), palette.white)
     add_lamp((2.88, DEPTH - 0.42, 0.0), palette.metal)
     add_plant((0.42, DEPTH - 0.42, 0.0))
     _add_sun_and_sky()
@@ -108,7 +108,7 @@ def _add_window(palette):
         box((back, y1 - bar, z0), (front, y1, z1)),
         box((back, middle - bar, z0), (front, middle + bar, z1)),
     ]
-    for left, right in ((y0 + bar, middle - bar), (middle + bar, y1 - bar)):
+    for left, right in ((y0 + bar + GAP, middle - bar - GAP), (middle + bar + GAP, y1 - bar - GAP)):
         frame += [
             box((back, left, z0), (front, right, z0 + bar)),
             box((back, left, z1 - bar), (front, right, z1)),
@@ -125,7 +125,7 @@ def _add_curtains(palette):
     linen = diffuse("linen", (0.74, 0.68, 0.58))
     y0, _, y1, z1 = WINDOW
     for name, start, stop in (("curtain near", y0 - 0.42, y0 - 0.02), ("curtain far", y1 + 0.02, y1 + 0.42)):
-        add_object(name, _folds(start, stop, 0.02, z1 + 0.14), linen)
+        add_object(name, _folds(start, stop, 0.02, z1 + 0.19), linen)
     length = y1 - y0 + 1.0
     rod = cylinder(0.011, length, 12)
     along_y = rod.points[:, [1, 2, 0]] + (0.085, y0 - 0.5, z1 + 0.165)
@@ -164,7 +164,7 @@ def _add_door(palette):
     frame = [
         box((x0 - trim, wall - 0.040, GAP), (x0, wall, top)),
         box((x1, wall - 0.040, GAP), (x1 + trim, wall, top)),
-        box((x0 - trim, wall - 0.040, top), (x1 + trim, wall, top + trim)),
+        box((x0 - trim, wall - 0.040, top + GAP), (x1 + trim, wall, top + trim)),
     ]
     add_object("door frame", joined(*frame), palette.white)
     knob = sphere(0.026, 20, 10).moved((x0 + 0.055, wall - 0.075, 1.0))
@@ -186,8 +186,8 @@ def _add_picture(palette):
     frame = [
         box((x0 - bar, wall - 0.028, z0 - bar), (x1 + bar, wall, z0 - GAP)),
         box((x0 - bar, wall - 0.028, z1 + GAP), (x1 + bar, wall, z1 + bar)),
-        box((x0 - bar, wall - 0.028, z0 - GAP), (x0 - GAP, wall, z1 + GAP)),
-        box((x1 + GAP, wall - 0.028, z0 - GAP), (x1 + bar, wall, z1 + GAP)),
+        box((x0 - bar, wall - 0.028, z0), (x0 - GAP, wall, z1)),
+        box((x1 + GAP, wall - 0.028, z0), (x1 + bar, wall, z1)),
     ]
     add_object("picture frame", joined(*frame), palette.oak)
 
