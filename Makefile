@@ -40,7 +40,7 @@ $(VENV)/.installed: $(VENV)/.made pyproject.toml
 	@touch $@
 
 $(KERNEL): $(KERNEL_SOURCES) $(DOOR_SOURCES) $(KERNEL_HEADERS) | $(VENV)/.installed
-	$(BIN)/python -c "import setuptools; setuptools.setup()" --quiet build_ext --inplace --force
+	$(BIN)/python -W ignore -c "import setuptools; setuptools.setup()" --quiet build_ext --inplace --force
 	@touch $@
 
 kernel: $(VENV)/.installed $(KERNEL)

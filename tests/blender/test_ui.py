@@ -9,6 +9,7 @@ bpy = pytest.importorskip("bpy")
 from addon import registration  # noqa: E402 - needs bpy
 from addon.core.settings import METHODS, SOLVERS, TARGETS, BakeCancelled, BakeSettings  # noqa: E402
 from addon.ui.job import BakeJob  # noqa: E402
+from addon.ui.properties import PATCHLIGHT_PG_settings  # noqa: E402
 from tests.cube_room import build_cube_room, empty_file  # noqa: E402
 
 
@@ -47,7 +48,7 @@ def test_the_panel_stands_in_the_sidebar_of_the_3d_view(registered):
 
 
 def test_every_option_has_a_tooltip(registered):
-    properties = bpy.types.PATCHLIGHT_PG_settings.bl_rna.properties
+    properties = PATCHLIGHT_PG_settings.bl_rna.properties
     missing = [p.identifier for p in properties if p.identifier not in ("rna_type", "name") and not p.description]
     assert missing == []
 
@@ -67,7 +68,7 @@ def test_the_defaults_are_those_of_the_core(registered):
 
 @pytest.mark.parametrize(("name", "choices"), [("target", TARGETS), ("method", METHODS), ("solver", SOLVERS)])
 def test_the_menus_offer_what_the_core_knows(registered, name, choices):
-    items = bpy.types.PATCHLIGHT_PG_settings.bl_rna.properties[name].enum_items
+    items = PATCHLIGHT_PG_settings.bl_rna.properties[name].enum_items
     assert tuple(item.identifier for item in items) == choices
 
 
