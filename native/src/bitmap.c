@@ -92,19 +92,27 @@ void pl_bits_add_conflicts(const uint64_t *taken, int32_t words, int32_t start, 
         io_conflicts[w] |= scratch[w];
 }
 
-bool pl_bitmap_collides(const pl_bitmap *atlas, const pl_bitmap *mask, int32_t column, int32_t row) {
-    const int32_t skip = column / PL_WORD_BITS, shift = column % PL_WORD_BITS;
-
-    for (int32_t r = 0; r < mask->rows; ++r) {
-        const uint64_t *bits = pl_bitmap_row(mask, r), *taken = pl_bitmap_row(atlas, row + r) + skip;
-        for (int32_t w = 0; w < mask->words; ++w) {
-            if (bits[w] << shift & taken[w])
-                return true;
-            if (shift && bits[w] >> (PL_WORD_BITS - shift) & (skip + w + 1 < atlas->words ? taken[w + 1] : 0))
-                return true;
-        }
+static bool row_collides(const uint64_t *bits, int32_t count, int32_t shift, const uint64_t *taken,
+                         int32_t taken_count) {
+    for (int32_t w = 0; w < count; ++w) {
+        if (bits[w] << shift & taken[w])
+            return true;
+        if (shift && w + 1 < taken_count && bits[w] >> (PL_WORD_BITS - shift) & taken[w + 1])
+            return true;
     }
     return false;
+}
+
+int32_t pl_bitmap_collision(const pl_bitmap *atlas, const pl_bitmap *mask, int32_t column, int32_t row, int32_t first) {
+    const int32_t skip = column / PL_WORD_BITS, shift = column % PL_WORD_BITS;
+
+    for (int32_t i = 0; i < mask->rows; ++i) {
+        const int32_t r = first + i < mask->rows ? first + i : first + i - mask->rows;
+        if (row_collides(pl_bitmap_row(mask, r), mask->words, shift, pl_bitmap_row(atlas, row + r) + skip,
+                         atlas->words - skip))
+            return r;
+    }
+    return -1;
 }
 
 bool pl_bits_is_full(const uint64_t *words, int32_t count) {

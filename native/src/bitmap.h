@@ -44,7 +44,10 @@ void pl_bits_add_conflicts(const uint64_t *taken, int32_t words, int32_t start, 
 
 bool pl_bits_is_full(const uint64_t *words, int32_t count);
 
-/* Whether the mask, with its first bit at that place of the atlas, meets a taken bit. */
-bool pl_bitmap_collides(const pl_bitmap *atlas, const pl_bitmap *mask, int32_t column, int32_t row);
+/*
+ * A row of the mask that meets a taken bit when its first bit stands at that place of the atlas, -1 if none. Rows are
+ * tried from `first` on, around: where the mask did not fit last time it will likely not fit a column further.
+ */
+int32_t pl_bitmap_collision(const pl_bitmap *atlas, const pl_bitmap *mask, int32_t column, int32_t row, int32_t first);
 
 #endif

@@ -135,10 +135,13 @@ static int32_t fit_in_row(const atlas_job *job, bool is_turned, const int32_t *p
             return -1;
     }
     const int32_t end = words * PL_WORD_BITS;
+    int32_t collision = 0;
     for (int32_t column = pl_bits_next(conflicts, 0, end, false); column < end;
-         column = pl_bits_next(conflicts, column + 1, end, false))
-        if (!pl_bitmap_collides(atlas, mask, column, row))
+         column = pl_bits_next(conflicts, column + 1, end, false)) {
+        collision = pl_bitmap_collision(atlas, mask, column, row, collision);
+        if (collision < 0)
             return column;
+    }
     return -1;
 }
 

@@ -1,0 +1,73 @@
+"""Unwrap the target objects into one lightmap, or keep the UVs that they have."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .charts import Charts, target_surface
+from .cut import cut
+from .flatten import flatten
+from .packing import pack
+from .scene import Scene, SceneError
+from .settings import BakeSettings
+
+
+def unwrap(scene: Scene, settings: BakeSettings) -> Charts:
+    """Where each triangle of the target objects lies in the lightmap.
+
+    All objects share one atlas of at most ``settings.texels`` texels, or of ``settings.density`` texels/m. No texel is
+    within bilinear reach of two charts, and one free texel lies between them for mipmaps. Polygons stay whole: a loop
+    has one UV. Same input, same bytes.
+
+    With ``settings.keep_uvs`` the objects' own UVs decide, over a square of ``settings.texels``; they may overlap.
+    """
+    surface = target_surface(scene)
+    if settings.keep_uvs:
+        return _kept(scene, settings.texels)
+    return pack(flatten(surface, cut(surface)), len(scene.triangles), settings)
+
+
+def _kept(scene, texels):
+    side = math.isqrt(texels)
+    uvs = np.full((len(scene.triangles), 3, 2), np.nan, np.float32)
+    charts = np.full(len(scene.triangles), -1, np.int32)
+    chart_count = 0
+    for obj in scene.objects:
+        if not obj.is_target or not obj.count:
+            continue
+        kept = _checked_uvs(obj)
+        uvs[obj.span] = kept * np.float32(side)
+        charts[obj.span] = _connected(kept) + chart_count
+        chart_count = int(charts[obj.span].max()) + 1
+    return Charts(uvs, charts, side, side)
+
+
+def _checked_uvs(obj):
+    if obj.lightmap_uvs is None:
+        raise SceneError(f'object {obj.name} has no UV layer "Lightmap" to keep')
+    uvs = np.asarray(obj.lightmap_uvs, np.float32)
+    outside = ~((uvs >= 0) & (uvs <= 1)).all(axis=(1, 2))
+    if outside.any():
+        raise SceneError(
+            f'object {obj.name}: the UV layer "Lightmap" leaves the square from 0 to 1 on {int(outside.sum())} of '
+            f"{obj.count} triangles"
+        )
+    return uvs
+
+
+def _connected(uvs):
+    """Number the pieces that hang together at corners of one UV, int32 (N,), in order of their first triangle."""
+    _, corners = np.unique(uvs.reshape(-1, 2), axis=0, return_inverse=True)
+    corners = corners.reshape(-1, 3)
+    labels = np.arange(len(corners))
+    while True:
+        # the lowest label around each corner, then the lowest of a triangle's corners, then of its label's label
+        lowest = np.full(corners.max() + 1, len(corners))
+        np.minimum.at(lowest, corners.reshape(-1), np.repeat(labels, 3))
+        found = lowest[corners].min(axis=1)
+        found = found[found]
+        if (found == labels).all():
+            return np.unique(labels, return_inverse=True)[1].astype(np.int32)
+        labels = found
