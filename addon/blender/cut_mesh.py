@@ -1,90 +1,132 @@
-"""Cutting long edges of a copy of a mesh: vertex colours need vertices where the light changes."""
+"""A copy of a mesh with its long edges cut: vertex colours need vertices where the light changes."""
 
 from __future__ import annotations
 
-import bmesh
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ..core.scene import SceneError
-from .read_mesh import read_positions
+from .cut_faces import Faces, cut_faces, edge_keys
+from .read_mesh import corner_vertices, read_positions
+from .rebuild_mesh import Origins, rebuild_mesh
 
 MOST_FACES = 20_000_000
 
 
-def cut_mesh(blender_object, matrix: np.ndarray, longest: float):
+def cut_mesh(blender_object, matrix: np.ndarray, longest: float) -> bpy.types.Mesh | None:
     """A copy of the object's mesh with every edge at most ``longest`` [m, world space] long.
 
     Returns a new Mesh without users, or None where no edge is longer (or the mesh is not finite: reading it says so).
-    Edges are halved until they are short enough, in all their faces at once, so that no T-junction appears. Materials,
-    UVs, sharp edges and smooth shading are kept.
+    Materials, UVs, attributes, sharp edges and flat faces are kept; custom normals and vertex groups are not.
     """
-    if not np.isfinite(read_positions(blender_object.data)).all():
+    mesh = blender_object.data
+    positions = read_positions(mesh) @ matrix[:3, :3].T + matrix[:3, 3]
+    if not len(mesh.polygons) or not np.isfinite(positions).all():
         return None
-    bm = bmesh.new()
-    try:
-        bm.from_mesh(blender_object.data)
-        linear = Matrix(matrix[:3, :3].tolist())
-        if not _long_edges(bm, linear, longest) and not _wide_ngons(bm, linear, longest):
-            return None
-        _require_possible(bm, linear, longest, blender_object.name)
-        _cut(bm, linear, longest)
-        return _new_mesh(bm, blender_object.data)
-    finally:
-        bm.free()
+    polygons = _Polygons(mesh, positions, longest)
+    if not polygons.is_cut.any():
+        return None
+    quads, triangles = polygons.cut_quads(), polygons.cut_triangles()
+    _require_possible(positions[polygons.vertices[triangles]], longest, blender_object.name)
+    sources = np.concatenate([quads, triangles[:, [0, 1, 2, 2]]])
+    faces = cut_faces(_first_faces(mesh, positions, polygons.vertices, quads, triangles), longest)
+    return rebuild_mesh(mesh, _origins(polygons, faces, sources))
 
 
-def _cut(bm, linear, longest):
-    # Cutting adds no inner vertices to a polygon of five or more corners, and crosses over in a concave quad.
-    _triangulate(bm, _wide_ngons(bm, linear, longest) + _wide_concave_quads(bm, linear, longest))
-    while edges := _long_edges(bm, linear, longest):
-        bmesh.ops.subdivide_edges(bm, edges=edges, cuts=1, use_grid_fill=True)
-        _triangulate(bm, [face for face in bm.faces if len(face.verts) > 4])
+class _Polygons:
+    """A mesh's polygons, and which of them have to be cut."""
+
+    def __init__(self, mesh, positions, longest):
+        self.vertices = corner_vertices(mesh).astype(np.int64)
+        self.starts, self.sizes = (np.empty(len(mesh.polygons), np.int32) for _ in range(2))
+        mesh.polygons.foreach_get("loop_start", self.starts)
+        mesh.polygons.foreach_get("loop_total", self.sizes)
+        self.of_corner = np.repeat(np.arange(len(self.sizes)), self.sizes)
+        order = np.argsort(self.starts)  # corners of a polygon are consecutive; polygons may be in any order
+        self.of_corner = order[np.repeat(np.arange(len(order)), self.sizes[order])]
+        corners = positions[self.vertices]
+        extents = [reduce.reduceat(corners, self.starts[order]) for reduce in (np.maximum, np.minimum)]
+        width = np.empty(len(order))
+        width[order] = np.linalg.norm(extents[0] - extents[1], axis=1)
+        # A polygon has a long edge, or may have an inner edge that is long, only when it is wide. Narrow ones stay.
+        self.is_cut = width > longest
+        self._read_triangles(mesh)
+        self._corners = corners
+
+    def _read_triangles(self, mesh):
+        mesh.calc_loop_triangles()
+        self._triangles = np.empty(len(mesh.loop_triangles) * 3, np.int32)
+        mesh.loop_triangles.foreach_get("loops", self._triangles)
+        self._triangles = self._triangles.reshape(-1, 3).astype(np.int64)
+        self._of_triangle = self.of_corner[self._triangles[:, 0]]
+
+    def cut_quads(self):
+        """Corners of the convex quads to be cut, int64 (Q, 4)."""
+        return self.starts[self._is_cut_quad()].astype(np.int64)[:, None] + np.arange(4)
+
+    def cut_triangles(self):
+        """Corners of the triangles of all other polygons to be cut, int64 (T, 3)."""
+        return self._triangles[(self.is_cut & ~self._is_cut_quad())[self._of_triangle]]
+
+    def kept_corners(self):
+        """Corners of the polygons that stay, in order, and the sizes of those polygons."""
+        return np.flatnonzero(~self.is_cut[self.of_corner]), np.flatnonzero(~self.is_cut)
+
+    def _is_cut_quad(self):
+        is_quad = self.is_cut & (self.sizes == 4)
+        corners = self._corners[self.starts[is_quad].astype(np.int64)[:, None] + np.arange(4)]
+        sides = np.roll(corners, -1, axis=1) - corners
+        turns = np.cross(np.roll(sides, 1, axis=1), sides)
+        # Convex: at every corner the outline turns the way that the whole polygon does. A straight corner does not.
+        is_quad[is_quad] = (np.einsum("qkx,qx->qk", turns, turns.sum(axis=1)) > 0).all(axis=1)
+        return is_quad
 
 
-def _long_edges(bm, linear, longest):
-    limit = longest * (1 + 1e-6)  # an edge of just that length is not cut by rounding
-    return [edge for edge in bm.edges if (linear @ (edge.verts[0].co - edge.verts[1].co)).length > limit]
+def _first_faces(mesh, positions, vertices, quads, triangles):
+    """The polygons to be cut, each corner made of itself alone."""
+    ends = np.empty(len(mesh.edges) * 2, np.int32)
+    mesh.edges.foreach_get("vertices", ends)
+    keys = edge_keys(*ends.reshape(-1, 2).astype(np.int64).T)
+    order = np.argsort(keys)
+    quad_corners, triangle_corners = quads.size, triangles.size
+    return Faces(
+        positions=positions,
+        vertices=np.concatenate([vertices[quads.ravel()], vertices[triangles.ravel()]]),
+        sources=np.concatenate(
+            [np.repeat(np.arange(len(quads)), 4), len(quads) + np.repeat(np.arange(len(triangles)), 3)]
+        ),
+        weights=np.concatenate([np.tile(np.eye(4), (len(quads), 1)), np.tile(np.eye(3, 4), (len(triangles), 1))]),
+        quads=np.arange(quad_corners).reshape(-1, 4),
+        triangles=np.arange(quad_corners, quad_corners + triangle_corners).reshape(-1, 3),
+        edge_keys=keys[order],
+        edge_origins=order,
+    )
 
 
-def _wide_ngons(bm, linear, longest):
-    return [face for face in bm.faces if len(face.verts) > 4 and _is_wide(face, linear, longest)]
+def _origins(polygons, faces: Faces, sources) -> Origins:
+    """Where all of the cut mesh comes from; its polygons are the kept ones, the quads, the triangles."""
+    kept, kept_polygons = polygons.kept_corners()
+    corners = np.concatenate([faces.quads.ravel(), faces.triangles.ravel()])
+    first_corners = np.concatenate([faces.quads[:, 0], faces.triangles[:, 0]])
+    own_weight = np.tile([1.0, 0.0, 0.0, 0.0], (len(kept), 1))
+    order = np.argsort(polygons.starts[kept_polygons])
+    kept_polygons = kept_polygons[order]
+    sizes = [polygons.sizes[kept_polygons], np.full(len(faces.quads), 4), np.full(len(faces.triangles), 3)]
+    return Origins(
+        vertices=np.concatenate([polygons.vertices[kept], faces.vertices[corners]]),
+        corners=np.concatenate([np.repeat(kept[:, None], 4, axis=1), sources[faces.sources[corners]]]),
+        weights=np.concatenate([own_weight, faces.weights[corners]]),
+        sizes=np.concatenate(sizes),
+        polygons=np.concatenate([kept_polygons, polygons.of_corner[sources[faces.sources[first_corners], 0]]]),
+        edge_keys=faces.edge_keys,
+        edges=faces.edge_origins,
+    )
 
 
-def _is_wide(face, linear, longest):
-    corners = np.array([linear @ vertex.co for vertex in face.verts])
-    return np.linalg.norm(np.ptp(corners, axis=0)) > longest
-
-
-def _wide_concave_quads(bm, linear, longest):
-    quads = [face for face in bm.faces if len(face.verts) == 4 and not all(loop.is_convex for loop in face.loops)]
-    return [face for face in quads if _is_wide(face, linear, longest)]
-
-
-def _triangulate(bm, faces):
-    if faces:
-        bmesh.ops.triangulate(bm, faces=faces, quad_method="BEAUTY", ngon_method="BEAUTY")
-
-
-def _require_possible(bm, linear, longest, name):
-    scale = abs(linear.determinant()) ** (2 / 3) or 1.0
-    count = sum(face.calc_area() for face in bm.faces) * scale / longest**2
+def _require_possible(triangles, longest, name):
+    area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1).sum()
+    count = area / longest**2
     if count > MOST_FACES:
         raise SceneError(
             f"subdivide is {longest:g} m: '{name}' would get about {count:.1e} faces, allowed is {MOST_FACES:.0e}"
         )
-
-
-def _new_mesh(bm, source):
-    mesh = bpy.data.meshes.new(source.name)
-    bm.to_mesh(mesh)
-    for material in source.materials:
-        mesh.materials.append(material)
-    for key in source.keys():
-        mesh[key] = source[key]
-    render = next((index for index, layer in enumerate(source.uv_layers) if layer.active_render), None)
-    if render is not None:
-        mesh.uv_layers[render].active_render = True
-        mesh.uv_layers.active_index = source.uv_layers.active_index
-    return mesh
