@@ -23,6 +23,8 @@ MOST_BLOCKS = 2048  # across the atlas; wider ones are packed in blocks of sever
 FULL_ENOUGH = 0.985  # of the texels asked for
 ATTEMPTS = 8
 WIDTHS = (0.71, 0.84, 1.19, 1.41)  # other widths than the square's, where large charts leave gaps
+FINE_WIDTHS = tuple(0.6 + 0.05 * step for step in range(21))
+FEW_CHARTS = 300  # so quickly packed that all of these are tried
 LARGE_CHART = 0.2  # of the width
 
 
@@ -67,13 +69,17 @@ def _pack_into(flat, texels):
     """As dense as it fits; the width of the square first, others where large charts make it matter."""
     width = math.isqrt(texels)
     best = _densest(flat, texels, width, math.sqrt(0.7 * texels / _area(flat)))
-    if flat.sizes.max() * best.density > LARGE_CHART * width:
-        others = [_pack_once(flat, best.density, round(width * factor)) for factor in WIDTHS]
-        smallest = min(others, key=lambda packing: packing.texels)
-        if smallest.texels < best.texels:
-            density = best.density * math.sqrt(texels / smallest.texels)
-            best = max(best, _densest(flat, texels, smallest.width, density), key=lambda packing: packing.density)
-    return best
+    if flat.sizes.max() * best.density < LARGE_CHART * width:
+        return best
+    if flat.chart_count <= FEW_CHARTS:
+        others = [_densest(flat, texels, round(width * factor), best.density) for factor in FINE_WIDTHS]
+        return max([best, *others], key=lambda packing: packing.density)
+    others = [_pack_once(flat, best.density, round(width * factor)) for factor in WIDTHS]
+    smallest = min(others, key=lambda packing: packing.texels)
+    if smallest.texels >= best.texels:
+        return best
+    density = best.density * math.sqrt(texels / smallest.texels)
+    return max(best, _densest(flat, texels, smallest.width, density), key=lambda packing: packing.density)
 
 
 def _densest(flat, texels, width, density):

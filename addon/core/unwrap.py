@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from .scene import Scene, SceneError
 from .settings import BakeSettings
 
 
-def unwrap(scene: Scene, settings: BakeSettings) -> Charts:
+def unwrap(scene: Scene, settings: BakeSettings, on_step: Callable[[float], None] | None = None) -> Charts:
     """Where each triangle of the target objects lies in the lightmap.
 
     All objects share one atlas of at most ``settings.texels`` texels, or of ``settings.density`` texels/m. No texel is
@@ -22,11 +23,20 @@ def unwrap(scene: Scene, settings: BakeSettings) -> Charts:
     has one UV. Same input, same bytes.
 
     With ``settings.keep_uvs`` the objects' own UVs decide, over a square of ``settings.texels``; they may overlap.
+
+    ``on_step(done)`` hears after each stage how much (0..1) is done; what it raises ends the work.
     """
     surface = target_surface(scene)
     if settings.keep_uvs:
         return _kept(scene, settings.texels)
-    return pack(flatten(surface, cut(surface)), len(scene.triangles), settings)
+    on_step = on_step or (lambda done: None)
+    pieces = cut(surface)
+    on_step(0.6)
+    flat = flatten(surface, pieces)
+    on_step(0.7)
+    charts = pack(flat, len(scene.triangles), settings)
+    on_step(1.0)
+    return charts
 
 
 def _kept(scene, texels):

@@ -241,13 +241,15 @@ static int32_t weight(const chart_size *chart) {
     return u + v + (u > v ? u : v);
 }
 
-/* Long charts first, then by index: one order on every machine. */
+/* Long charts first, equal ones one after the other, then by index: one order on every machine. */
 static int by_weight(const void *left, const void *right) {
     const chart_size *a = left, *b = right;
     const int32_t weight_a = weight(a), weight_b = weight(b);
 
     if (weight_a != weight_b)
         return weight_a > weight_b ? -1 : 1;
+    if (a->size[0] != b->size[0])
+        return a->size[0] > b->size[0] ? -1 : 1;
     return a->chart < b->chart ? -1 : 1;
 }
 
