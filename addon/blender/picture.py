@@ -19,7 +19,7 @@ from .visibility import Visibility
 from .write_lightmap import IMAGE_PROPERTY, RECT_PROPERTY
 from .write_vertex_colours import ATTRIBUTE
 
-MIDDLE_GREY = 0.26  # radiance that the median of the picture is exposed to: a light room, not a grey card
+MIDDLE_GREY = 0.20  # radiance that the median of the picture is exposed to: dark corners open, sun patches keep shape
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 

@@ -128,9 +128,9 @@ def test_automatic_exposure_brings_the_median_to_grey_at_any_brightness(wall, tm
         path = tmp_path / f"{light}.png"
         picture.render(path, width=16, height=16, samples=2, view_transform="Standard")
         shown.append(_read(path))
-    # Standard is the sRGB curve; 0.26 linear is 0.5472 encoded
-    assert picture.MIDDLE_GREY == 0.26
-    assert shown[0] == pytest.approx(0.5472, abs=PNG_LEVELS)
+    # Standard is the sRGB curve: 0.2 linear is 0.4845 encoded
+    assert picture.MIDDLE_GREY == 0.2
+    assert shown[0] == pytest.approx(0.4845, abs=PNG_LEVELS)
     assert shown[1] == pytest.approx(shown[0], abs=2 * PNG_LEVELS)
 
 
