@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core.scene import SceneError
 from .cut_faces import Faces, cut_faces, edge_keys
-from .read_mesh import corner_vertices, read_positions
+from .read_mesh import are_finite, corner_vertices, read_positions
 from .rebuild_mesh import Origins, rebuild_mesh
 
 MOST_FACES = 20_000_000
@@ -21,7 +21,7 @@ def cut_mesh(blender_object, matrix: np.ndarray, longest: float) -> bpy.types.Me
     """
     mesh = blender_object.data
     positions = read_positions(mesh) @ matrix[:3, :3].T + matrix[:3, 3]
-    if not len(mesh.polygons) or not np.isfinite(positions).all():
+    if not len(mesh.polygons) or not are_finite(positions):
         return None
     polygons = _Polygons(mesh, positions, longest)
     if not polygons.is_cut.any():

@@ -8,6 +8,9 @@ import numpy as np
 
 LIGHTMAP_LAYER = "Lightmap"
 
+# Blender stores an infinite coordinate as the largest float; a ray squares distances, in float32.
+FARTHEST = 1e15
+
 
 @dataclass(frozen=True, slots=True)
 class MeshArrays:
@@ -69,6 +72,11 @@ def read_mesh(mesh, uv_layers=()) -> MeshArrays:
 def read_positions(mesh) -> np.ndarray:
     """Vertex positions, float64 (V, 3)."""
     return _attribute(mesh, "position", "vector", np.float32, 3).astype(np.float64)
+
+
+def are_finite(positions) -> bool:
+    """Whether rays can be traced to these positions."""
+    return bool((np.abs(positions) < FARTHEST).all())
 
 
 def corner_vertices(mesh) -> np.ndarray:

@@ -15,7 +15,7 @@ from ..core.scene import Scene, SceneError, SceneObject
 from .place_mesh import PlacedMesh, place_mesh
 from .read_lights import read_lights
 from .read_materials import Materials
-from .read_mesh import MeshArrays, read_mesh
+from .read_mesh import MeshArrays, are_finite, read_mesh
 from .read_world import read_world
 from .targets import mesh_users, why_not_target
 from .visibility import Visibility
@@ -135,7 +135,7 @@ class SceneReading:
     def _append(self, name, target, evaluated, mesh, matrix):
         rows, layers = self._slot_materials(evaluated, mesh)
         arrays = read_mesh(mesh, layers)
-        if not (np.isfinite(arrays.positions).all() and np.isfinite(matrix).all()):
+        if not (are_finite(arrays.positions) and are_finite(matrix)):
             self.refusals[name] = f"'{name}' has vertices that are not finite (NaN or infinite): it is left out"
             self.warn(self.refusals[name])
             return

@@ -1,0 +1,118 @@
+"""Scenes built by hand, from an empty file. Without bpy the folder is left out as a whole."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+if find_spec("bpy") is None:
+    collect_ignore_glob = ["test_*.py"]
+else:
+    import bpy
+
+
+@pytest.fixture
+def empty_file():
+    """No objects, no world, no materials; what every test of this folder that builds its own scene starts from."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return bpy.context.scene
+
+
+@pytest.fixture
+def add_mesh():
+    """Add an object of vertices and faces to the scene."""
+
+    def add(name, vertices, faces, material=None):
+        mesh = bpy.data.meshes.new(name)
+        mesh.from_pydata([tuple(map(float, v)) for v in vertices], [], faces)
+        if material is not None:
+            mesh.materials.append(material)
+        blender_object = bpy.data.objects.new(name, mesh)
+        bpy.context.scene.collection.objects.link(blender_object)
+        return blender_object
+
+    return add
+
+
+@pytest.fixture
+def add_cube(add_mesh):
+    """Add a cube of side 2 around the origin, faces outwards."""
+
+    def add(name="Cube", material=None):
+        vertices = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+        faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+        return add_mesh(name, vertices, faces, material)
+
+    return add
+
+
+@pytest.fixture
+def add_lamp():
+    """Add a lamp; keyword arguments are set on its data."""
+
+    def add(kind, name="Lamp", location=(0, 0, 0), rotation=(0, 0, 0), **values):
+        data = bpy.data.lights.new(name, kind)
+        for key, value in values.items():
+            setattr(data, key, value)
+        lamp = bpy.data.objects.new(name, data)
+        lamp.location, lamp.rotation_euler = location, rotation
+        bpy.context.scene.collection.objects.link(lamp)
+        return lamp
+
+    return add
+
+
+@pytest.fixture
+def nodes():
+    """A new material with an empty node tree: (material, new(type, **values), link(output, input))."""
+
+    def make(name="Material", shader=None):
+        material = bpy.data.materials.new(name)
+        material.use_nodes = True
+        material.node_tree.nodes.clear()
+        return material, NodeTree(material.node_tree)
+
+    return make
+
+
+class NodeTree:
+    """Short words for building a shader tree."""
+
+    def __init__(self, tree):
+        self.tree = tree
+
+    def new(self, kind, **inputs):
+        """A node by the short name of its type; underscores in the inputs' names are spaces."""
+        prefix = "Node" if kind in {"Reroute", "GroupInput", "GroupOutput"} else "ShaderNode"
+        node = self.tree.nodes.new(prefix + kind)
+        for name, value in inputs.items():
+            node.inputs[name.replace("_", " ")].default_value = value
+        return node
+
+    def link(self, source, target, source_socket=0, target_socket=0):
+        """Link two nodes' sockets by name or position."""
+        self.tree.links.new(source.outputs[source_socket], target.inputs[target_socket])
+        return target
+
+    def show(self, shader):
+        """Make a shader the surface."""
+        return self.link(shader, self.new("OutputMaterial"), 0, "Surface")
+
+
+@pytest.fixture
+def add_image():
+    """Add an image of given pixels, float32 (height, width, 3), stored as bytes or floats."""
+
+    def add(pixels, name="Image", is_float=False, space="sRGB"):
+        height, width = pixels.shape[:2]
+        image = bpy.data.images.new(name, width, height, float_buffer=is_float)
+        image.colorspace_settings.name = space
+        rgba = np.ones((height, width, 4), np.float32)
+        rgba[..., :3] = pixels
+        image.pixels.foreach_set(rgba.ravel())
+        image.update()
+        return image
+
+    return add

@@ -1,0 +1,194 @@
+"""Lamps and world: each one's radiometry against Cycles' formulas."""
+
+from __future__ import annotations
+
+from math import cos, pi, radians, sin, tan
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.blender.read_scene import read_scene
+from addon.core.scene import AreaLight, PointLight, SunLight
+
+pytestmark = pytest.mark.usefixtures("empty_file")
+
+COLOUR = (1.0, 0.5, 0.25)  # exact in float32
+FLOAT32 = 1e-6
+
+
+@pytest.fixture
+def read(add_cube):
+    """Read the lamps of a scene with a cube in it."""
+
+    def read_lamps():
+        add_cube()
+        scene = read_scene(bpy.context.scene)
+        return scene.lights, scene
+
+    return read_lamps
+
+
+@pytest.fixture
+def set_world():
+    """Give the scene a world of one background, and return its node tree and background node."""
+
+    def make(colour=(0, 0, 0, 1), strength=1.0):
+        world = bpy.data.worlds.new("Sky")
+        world.use_nodes = True
+        bpy.context.scene.world = world
+        background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
+        background.inputs["Color"].default_value = colour
+        background.inputs["Strength"].default_value = strength
+        return world.node_tree, background
+
+    return make
+
+
+def test_point(add_lamp, read):
+    add_lamp("POINT", location=(1, 2, 3), energy=100, color=COLOUR, shadow_soft_size=0.25, use_soft_falloff=True)
+    (light,), _ = read()
+    assert isinstance(light, PointLight)
+    assert light.position == (1, 2, 3)
+    np.testing.assert_allclose(light.intensity, np.array(COLOUR) * 100 / (4 * pi), rtol=FLOAT32)
+    assert light.radius == 0.25
+    assert light.soft_falloff is True
+    assert light.cone_cosines[1] < -1  # no cone
+
+
+def test_exposure_and_temperature_multiply(add_lamp, read):
+    lamp = add_lamp("POINT", energy=8.0, exposure=-2.0, use_temperature=True, temperature=3000.0).data
+    (light,), _ = read()
+    np.testing.assert_allclose(light.intensity, 2 * np.array(lamp.temperature_color) / (4 * pi), rtol=FLOAT32)
+
+
+def test_a_point_that_is_not_normalised_is_a_sphere_of_p_over_pi(add_lamp, read):
+    add_lamp("POINT", energy=8.0, normalize=False, shadow_soft_size=0.5)
+    (light,), _ = read()
+    sphere_radiance = light.intensity[0] / (pi * 0.5**2)
+    assert sphere_radiance == pytest.approx(8.0 / pi, rel=FLOAT32)
+
+
+def test_spot_is_a_point_with_a_cone(add_lamp, read):
+    add_lamp("SPOT", rotation=(0, pi / 2, 0), energy=4 * pi, spot_size=radians(60), spot_blend=0.5)
+    (light,), _ = read()
+    np.testing.assert_allclose(light.direction, (-1, 0, 0), atol=FLOAT32)
+    np.testing.assert_allclose(light.intensity, 1.0, rtol=FLOAT32)
+    outer = cos(radians(30))
+    np.testing.assert_allclose(light.cone_cosines, (outer, outer + 0.5 * (1 - outer)), rtol=FLOAT32)
+
+
+def test_a_hard_spot_has_an_edge_of_some_width(add_lamp, read):
+    add_lamp("SPOT", spot_blend=0.0)
+    (light,), _ = read()
+    assert light.cone_cosines[0] < light.cone_cosines[1] < light.cone_cosines[0] + 1e-5
+
+
+@pytest.mark.parametrize(
+    ("shape", "area"),
+    [("SQUARE", 2 * 2), ("RECTANGLE", 2 * 3), ("DISK", pi / 4 * 2 * 2), ("ELLIPSE", pi / 4 * 2 * 3)],
+)
+@pytest.mark.parametrize("mirror", [1, -1])
+def test_area_radiance_counts_the_scaled_area(add_lamp, read, shape, area, mirror):
+    lamp = add_lamp("AREA", location=(0, 0, 5), energy=10, shape=shape, size=2, size_y=3)
+    lamp.scale = (3 * mirror, 0.5, 1)
+    (light,), _ = read()
+    assert isinstance(light, AreaLight)
+    np.testing.assert_allclose(light.radiance, 10 / (pi * area * 1.5), rtol=FLOAT32)
+    sides = np.linalg.norm(light.axis_u), np.linalg.norm(light.axis_v)
+    np.testing.assert_allclose(sides, (3.0, 0.75 if shape in {"RECTANGLE", "ELLIPSE"} else 0.5), rtol=FLOAT32)
+    facing = np.cross(light.axis_u, light.axis_v)
+    np.testing.assert_allclose(facing / np.linalg.norm(facing), (0, 0, -1), atol=FLOAT32)
+    assert light.is_ellipse == (shape in {"DISK", "ELLIPSE"})
+    assert light.spread == pytest.approx(pi)
+
+
+def test_area_not_normalised_and_spread(add_lamp, read):
+    add_lamp("AREA", energy=10, size=2, normalize=False, spread=radians(60))
+    (light,), _ = read()
+    np.testing.assert_allclose(light.radiance, 10 / pi, rtol=FLOAT32)
+    assert light.spread == pytest.approx(radians(60))
+    # what the contract makes of it on the axis, as measured in Cycles: 10.4 times the unspread light
+    assert tan(light.spread / 2) / (tan(light.spread / 2) - light.spread / 2) == pytest.approx(10.7, rel=0.05)
+
+
+def test_sun(add_lamp, read):
+    add_lamp("SUN", rotation=(0, pi / 2, 0), energy=3, color=COLOUR, angle=radians(2))
+    (light,), _ = read()
+    assert isinstance(light, SunLight)
+    np.testing.assert_allclose(light.direction, (-1, 0, 0), atol=FLOAT32)
+    np.testing.assert_allclose(light.irradiance, np.array(COLOUR) * 3, rtol=FLOAT32)
+    assert light.angle == pytest.approx(radians(2))
+
+
+def test_a_sun_that_is_not_normalised_is_a_disc_of_that_radiance(add_lamp, read):
+    add_lamp("SUN", energy=1000, normalize=False, angle=radians(2))
+    (light,), _ = read()
+    np.testing.assert_allclose(light.irradiance, 1000 * pi * sin(radians(1)) ** 2, rtol=1e-5)  # float32 angle
+
+
+def test_hidden_and_dark_lamps_are_left_out_and_instances_counted(add_lamp, read):
+    add_lamp("POINT", "Hidden").hide_render = True
+    add_lamp("POINT", "Off", energy=0)
+    source = bpy.data.collections.new("Fitting")
+    lamp = add_lamp("POINT", "Bulb")
+    source.objects.link(lamp)
+    bpy.context.scene.collection.objects.unlink(lamp)
+    for index in range(2):
+        empty = bpy.data.objects.new("Place", None)
+        empty.instance_type, empty.instance_collection, empty.location = "COLLECTION", source, (index, 0, 0)
+        bpy.context.scene.collection.objects.link(empty)
+    lights, _ = read()
+    assert sorted(light.position[0] for light in lights) == [0, 1]
+
+
+def test_emission_nodes_of_a_lamp_multiply(add_lamp, read):
+    lamp = add_lamp("POINT", energy=4 * pi).data
+    lamp.use_nodes = True
+    emission = next(n for n in lamp.node_tree.nodes if n.type == "EMISSION")
+    emission.inputs["Color"].default_value = (*COLOUR, 1)
+    emission.inputs["Strength"].default_value = 2
+    (light,), _ = read()
+    np.testing.assert_allclose(light.intensity, np.array(COLOUR) * 2, rtol=FLOAT32)
+
+
+def test_unreadable_nodes_of_a_lamp_are_named(add_lamp, read):
+    lamp = add_lamp("POINT", "Candle", energy=4 * pi).data
+    lamp.use_nodes = True
+    emission = next(n for n in lamp.node_tree.nodes if n.type == "EMISSION")
+    lamp.node_tree.links.new(lamp.node_tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], emission.inputs["Color"])
+    (light,), scene = read()
+    np.testing.assert_allclose(light.intensity, 1.0, rtol=FLOAT32)
+    assert any("'Candle'" in warning for warning in scene.warnings)
+
+
+def test_no_world_is_black(read):
+    assert read()[1].world_radiance == (0, 0, 0)
+
+
+def test_the_world_is_colour_times_strength(set_world, read):
+    set_world((*COLOUR, 1), 4.0)
+    np.testing.assert_allclose(read()[1].world_radiance, np.array(COLOUR) * 4)
+
+
+def test_a_sky_image_is_averaged_over_the_sphere_and_named(set_world, read, add_image):
+    """The upper cap z > sin(45 deg) is bright: it covers (1 - sin 45) / 2 of the sphere, but a quarter of the rows."""
+    tree, background = set_world(strength=2.0)
+    pixels = np.zeros((400, 8, 3), np.float32)
+    pixels[300:] = COLOUR
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = add_image(pixels, "Sunset", is_float=True, space="Non-Color")
+    tree.links.new(node.outputs[0], background.inputs["Color"])
+    _, scene = read()
+    share = (1 - sin(pi / 4)) / 2
+    np.testing.assert_allclose(scene.world_radiance, 2 * share * np.array(COLOUR), rtol=1e-4)  # midpoint rule, 400 rows
+    assert any("'Sky'" in warning and "'Sunset'" in warning for warning in scene.warnings)
+
+
+def test_an_unreadable_sky_is_never_silently_black(set_world, read):
+    tree, background = set_world()
+    bpy.context.scene.world.color = COLOUR
+    tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
+    _, scene = read()
+    np.testing.assert_allclose(scene.world_radiance, COLOUR)
+    assert any("'Sky'" in warning for warning in scene.warnings)

@@ -1,0 +1,285 @@
+"""Shader nodes -> reflectance, radiance, transmittance: the table, the images, and what cannot be read."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.blender.read_scene import read_scene
+
+pytestmark = pytest.mark.usefixtures("empty_file")
+
+RED = (0.5, 0.25, 0.125, 1.0)  # exact in float32
+GREY = (0.75, 0.75, 0.75, 1.0)
+
+
+@pytest.fixture
+def read(add_cube):
+    """Read a material on a cube: (core material, warnings)."""
+
+    def read_material(material):
+        if not bpy.data.objects:
+            add_cube().data.uv_layers.new(name="UVMap")
+        bpy.data.objects[0].data.materials.clear()
+        bpy.data.objects[0].data.materials.append(material)
+        scene = read_scene(bpy.context.scene)
+        return scene.materials[scene.triangle_materials[0]], scene.warnings
+
+    return read_material
+
+
+def image_node(tree, image):
+    node = tree.new("TexImage")
+    node.image = image
+    return node
+
+
+def checker():
+    """2 x 3 pixels of bytes, exact as value / 255."""
+    return (np.arange(18).reshape(2, 3, 3) * 13 + 5).astype(np.float32) / 255
+
+
+@pytest.mark.parametrize(
+    ("kind", "inputs", "reflectance", "radiance", "transmittance"),
+    [
+        ("BsdfPrincipled", {"Base_Color": RED}, RED, 0, 0),
+        ("BsdfPrincipled", {"Base_Color": RED, "Metallic": 1.0}, RED, 0, 0),
+        ("BsdfPrincipled", {"Base_Color": GREY, "Transmission_Weight": 0.25}, np.array(GREY) * 0.75, 0, 0),
+        ("BsdfPrincipled", {"Base_Color": RED, "Transmission_Weight": 0.5}, 0, 0, RED),
+        ("BsdfPrincipled", {"Base_Color": GREY, "Alpha": 0.25}, np.array(GREY) * 0.25, 0, 0.75),
+        (
+            "BsdfPrincipled",
+            {"Base_Color": GREY, "Emission_Color": RED, "Emission_Strength": 3.0},
+            GREY,
+            np.array(RED) * 3,
+            0,
+        ),
+        ("BsdfDiffuse", {"Color": RED}, RED, 0, 0),
+        ("Emission", {"Color": RED, "Strength": 3.0}, 0, np.array(RED) * 3, 0),
+        ("BsdfTransparent", {"Color": RED}, 0, 0, RED),
+        ("BsdfGlass", {"Color": RED}, 0, 0, RED),
+        ("BsdfRefraction", {"Color": RED}, 0, 0, RED),
+        ("BsdfTranslucent", {"Color": RED}, 0, 0, RED),
+    ],
+)
+def test_the_table(nodes, read, kind, inputs, reflectance, radiance, transmittance):
+    material, tree = nodes()
+    tree.show(tree.new(kind, **inputs))
+    found, warnings = read(material)
+    for value, expected in (
+        (found.reflectance, reflectance),
+        (found.radiance, radiance),
+        (found.transmittance, transmittance),
+    ):
+        # Blender stores floats: inputs are exact in binary, products of them too
+        np.testing.assert_allclose(value, np.broadcast_to(expected, 4 if np.ndim(expected) else 3)[:3], atol=1e-7)
+    assert warnings == ()
+
+
+def test_a_mix_is_the_weighted_sum_and_an_add_the_sum(nodes, read):
+    material, tree = nodes()
+    mix, add = tree.new("MixShader", Fac=0.25), tree.new("AddShader")
+    tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
+    tree.link(tree.new("BsdfTransparent", Color=(1, 1, 1, 1)), mix, 0, 2)
+    tree.link(mix, add, 0, 0)
+    tree.link(tree.new("Emission", Color=RED, Strength=2.0), add, 0, 1)
+    tree.show(add)
+    found, warnings = read(material)
+    np.testing.assert_allclose(found.reflectance, np.array(GREY[:3]) * 0.75)
+    np.testing.assert_allclose(found.transmittance, [0.25] * 3)
+    np.testing.assert_allclose(found.radiance, np.array(RED[:3]) * 2)
+    assert warnings == ()
+
+
+def test_a_mix_of_image_and_colour_is_one_texture(nodes, read, add_image):
+    material, tree = nodes()
+    pixels = checker()
+    mix, diffuse = tree.new("MixShader", Fac=0.5), tree.new("BsdfDiffuse")
+    tree.link(image_node(tree, add_image(pixels, space="Non-Color")), diffuse, 0, "Color")
+    tree.link(diffuse, mix, 0, 1)
+    tree.link(tree.new("BsdfDiffuse", Color=RED), mix, 0, 2)
+    tree.show(mix)
+    found, _ = read(material)
+    shown = found.reflectance_texture.pixels * found.reflectance
+    np.testing.assert_allclose(shown, pixels / 2 + np.array(RED[:3]) / 2, atol=1e-6)  # float32 sums
+
+
+def test_links_go_through_reroutes_groups_and_muted_nodes(nodes, read):
+    group = bpy.data.node_groups.new("Paint", "ShaderNodeTree")
+    group.interface.new_socket("Paint", in_out="INPUT", socket_type="NodeSocketColor")
+    group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
+    start, end = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    diffuse = group.nodes.new("ShaderNodeBsdfDiffuse")
+    group.links.new(start.outputs["Paint"], diffuse.inputs["Color"])
+    group.links.new(diffuse.outputs[0], end.inputs["Shader"])
+    material, tree = nodes()
+    use, reroute = tree.new("Group"), tree.new("Reroute")
+    use.node_tree = group
+    colour, gamma = tree.new("RGB"), tree.new("Gamma", Gamma=9.0)
+    colour.outputs[0].default_value, gamma.mute = RED, True
+    tree.link(colour, gamma, 0, "Color")
+    tree.link(gamma, reroute)
+    tree.link(reroute, use, 0, "Paint")
+    tree.show(use)
+    found, warnings = read(material)
+    assert found.reflectance == RED[:3]
+    assert warnings == ()
+
+
+def test_srgb_bytes_become_linear_and_data_and_floats_stay(nodes, read, add_image):
+    pixels = checker()
+    linear = np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
+    for is_float, space, expected in (
+        (False, "sRGB", linear),
+        (False, "Non-Color", pixels),
+        (True, "Non-Color", pixels),
+    ):
+        material, tree = nodes(f"{space} {is_float}")
+        diffuse = tree.new("BsdfDiffuse")
+        tree.link(image_node(tree, add_image(pixels, is_float=is_float, space=space)), diffuse, 0, "Color")
+        tree.show(diffuse)
+        found, warnings = read(material)
+        np.testing.assert_allclose(found.reflectance_texture.pixels, expected, atol=1e-6)  # float32
+        assert warnings == ()
+
+
+def test_an_image_that_two_materials_use_is_one_texture(nodes, add_cube, add_image):
+    image = add_image(checker())
+    for name in "AB":
+        material, tree = nodes(name)
+        tree.show(tree.link(image_node(tree, image), tree.new("BsdfDiffuse"), 0, "Color"))
+        add_cube(name, material).data.uv_layers.new(name="UVMap")
+    first, second = read_scene(bpy.context.scene).materials[1:]
+    assert first.reflectance_texture is second.reflectance_texture is not None
+
+
+def test_an_emission_texture_is_scaled_by_the_strength(nodes, read, add_image):
+    material, tree = nodes()
+    tree.show(
+        tree.link(
+            image_node(tree, add_image(checker(), space="Non-Color")), tree.new("Emission", Strength=4.0), 0, "Color"
+        )
+    )
+    found, _ = read(material)
+    np.testing.assert_allclose(found.radiance_texture.pixels * found.radiance, checker() * 4, atol=1e-6)  # float32
+
+
+def test_reflectance_above_one_is_clipped(nodes, read, add_image):
+    material, tree = nodes("Value")
+    tree.show(tree.new("BsdfDiffuse", Color=(2.0, 0.5, -1.0, 1.0)))
+    assert read(material)[0].reflectance == (1.0, 0.5, 0.0)
+    material, tree = nodes("Texture")
+    pixels = checker() * 3
+    tree.show(tree.link(image_node(tree, add_image(pixels, is_float=True, space="Non-Color")), tree.new("BsdfDiffuse")))
+    found, _ = read(material)
+    shown = found.reflectance_texture.pixels * found.reflectance
+    np.testing.assert_allclose(shown, np.clip(pixels, 0, 1), atol=1e-6)  # float32
+
+
+def test_a_mapping_moves_the_uvs(nodes, add_mesh, add_image):
+    """POINT: turned(scaled(uv)) + location."""
+    material, tree = nodes()
+    mapping = tree.new("Mapping", Location=(0.5, 0.25, 0), Rotation=(0, 0, np.pi / 2), Scale=(2, 4, 1))
+    node = image_node(tree, add_image(checker()))
+    tree.link(tree.new("TexCoord"), mapping, "UV", "Vector")
+    tree.link(mapping, node, 0, "Vector")
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), 0, "Color"))
+    quad = add_mesh("Quad", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)], material)
+    quad.data.uv_layers.new(name="UVMap")
+    for loop, uv in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)]):
+        quad.data.uv_layers[0].uv[loop].vector = uv
+    scene = read_scene(bpy.context.scene)
+    uvs = scene.corners[..., :2]
+    expected = np.stack([-4 * uvs[..., 1] + 0.5, 2 * uvs[..., 0] + 0.25], axis=-1)
+    np.testing.assert_allclose(scene.uvs, expected, atol=1e-5)  # a float32 quarter turn
+    assert scene.warnings == ()
+
+
+def test_a_uv_map_node_chooses_its_layer(nodes, add_mesh, add_image):
+    material, tree = nodes()
+    chosen, node = tree.new("UVMap"), image_node(tree, add_image(checker()))
+    chosen.uv_map = "Second"
+    tree.link(chosen, node, 0, "Vector")
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), 0, "Color"))
+    triangle = add_mesh("Triangle", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], material)
+    for layer, name in enumerate(("First", "Second")):
+        triangle.data.uv_layers.new(name=name)
+        triangle.data.uv_layers[name].uv.foreach_set("vector", [layer + 0.5] * 6)
+    assert triangle.data.uv_layers["First"].active_render
+    assert (read_scene(bpy.context.scene).uvs == 1.5).all()
+
+
+def test_unreadable_colours_take_the_viewport_colour_and_are_named(nodes, read):
+    material, tree = nodes("Marble")
+    material.diffuse_color = RED
+    tree.show(tree.link(tree.new("TexNoise"), tree.new("BsdfDiffuse"), "Color", "Color"))
+    found, warnings = read(material)
+    assert found.reflectance == RED[:3]
+    assert len(warnings) == 1
+    assert "'Marble'" in warnings[0]
+    assert "Noise Texture" in warnings[0]
+
+
+def test_an_unreadable_shader_takes_the_viewport_colour_and_is_named(nodes, read):
+    material, tree = nodes("Fur")
+    material.diffuse_color = RED
+    tree.show(tree.new("BsdfHair"))
+    found, warnings = read(material)
+    assert found.reflectance == RED[:3]
+    assert "'Fur'" in warnings[0]
+
+
+def test_an_image_that_cannot_be_loaded_is_named(nodes, read):
+    material, tree = nodes("Poster")
+    material.diffuse_color = RED
+    image = bpy.data.images.new("Lost", 1, 1)
+    image.source, image.filepath = "FILE", "//no such picture.png"
+    tree.show(tree.link(image_node(tree, image), tree.new("BsdfDiffuse"), 0, "Color"))
+    found, warnings = read(material)
+    assert found.reflectance == RED[:3]
+    assert "'Poster'" in warnings[0]
+    assert "'Lost'" in warnings[0]
+
+
+def test_generated_coordinates_use_the_mean_colour(nodes, read, add_image):
+    material, tree = nodes("Box")
+    node = image_node(tree, add_image(checker(), space="Non-Color"))
+    tree.link(tree.new("TexCoord"), node, "Generated", "Vector")
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), 0, "Color"))
+    found, warnings = read(material)
+    assert found.reflectance_texture is None
+    np.testing.assert_allclose(found.reflectance, checker().mean(axis=(0, 1)), atol=1e-6)  # float32
+    assert "'Box'" in warnings[0]
+
+
+def test_nothing_linked_is_black_and_no_nodes_is_the_viewport_colour(nodes, read):
+    material, tree = nodes()
+    tree.new("OutputMaterial")
+    assert read(material)[0].reflectance == (0, 0, 0)
+    plain = bpy.data.materials.new("Plain")
+    plain.use_nodes = False
+    plain.diffuse_color = RED
+    assert read(plain)[0].reflectance == RED[:3]
+
+
+def test_a_glossy_shader_is_baked_as_diffuse_and_said_so(nodes, read):
+    material, tree = nodes("Chrome")
+    tree.show(tree.new("BsdfAnisotropic", Color=RED))
+    found, warnings = read(material)
+    assert found.reflectance == RED[:3]
+    assert "'Chrome'" in warnings[0]
+
+
+def test_a_large_image_is_shrunk_without_changing_its_mean(nodes, read, add_image):
+    material, tree = nodes()
+    pixels = np.random.default_rng(1).random((4, 4100, 3), dtype=np.float32)
+    tree.show(
+        tree.link(
+            image_node(tree, add_image(pixels, is_float=True, space="Non-Color")), tree.new("BsdfDiffuse"), 0, "Color"
+        )
+    )
+    texture = read(material)[0].reflectance_texture.pixels
+    assert texture.shape == (1, 1366, 3)
+    # 4100 = 3 x 1366 + 2 columns: at most the last two and the fourth row are left out
+    np.testing.assert_allclose(texture.mean(axis=(0, 1)), pixels[:3, :4098].mean(axis=(0, 1)), rtol=1e-5)
