@@ -74,11 +74,12 @@ class KernelScene:
         self._patches = _kernel.create_patches(apexes, first_rows, first_patches)
         self.side_count = 2 * int(first_patches[-1])
 
-    def patch_points(self, first, count, samples, seed):
-        """Even points on patches: triangles int32 (count * samples,), barycentrics float32 (count * samples, 3)."""
-        triangles = np.empty(count * samples, np.int32)
-        barycentrics = np.empty((count * samples, 3), np.float32)
-        _kernel.patch_points(self._patches, first, count, samples, seed, triangles, barycentrics)
+    def patch_points(self, patches, samples, seed):
+        """Even points on patches (K,): triangles int32 (K * samples,), barycentrics float32 (K * samples, 3)."""
+        patches = _rows(patches, np.int32)
+        triangles = np.empty(len(patches) * samples, np.int32)
+        barycentrics = np.empty((len(patches) * samples, 3), np.float32)
+        _kernel.patch_points(self._patches, patches, samples, seed, triangles, barycentrics)
         return triangles, barycentrics
 
     def form_factors_monte_carlo(self, sides, rays, seed):
@@ -116,36 +117,35 @@ class KernelScene:
         self.workers.each_range(int(first_rays[-1]), 1 << 16, call)
         return received, escaped[0]
 
-    def gather(self, radiosity, sky_radiosity, receivers, selected, replicates, first, count, seed, io_sums, on_step):
-        """Add the radiosity that each selected receiver's rays see to io_sums, float32 (N, replicates, 3)."""
-        sky = _rows(sky_radiosity, np.float32).reshape(1, 3)
-        radiosity = _rows(radiosity, np.float32)
+    def gather(self, solution, emitters, receivers, selected, replicates, first, count, seed, io_sums, on_step=None):
+        """Add the radiosity that each selected receiver's rays see to io_sums, float32 (N, replicates, 3).
+
+        Returns the rays traced. ``solution`` is a radiosity.PatchSolution.
+        """
+        field, lights, where = solution.arrays(), emitters.arrays(), receivers.arrays()
 
         def call(start, stop):
-            _kernel.gather(
-                self._scene, self._patches, radiosity, sky, receivers.positions, receivers.normals,
-                receivers.triangle_sides, selected[start:stop], replicates, first, count, seed, io_sums,
+            return _kernel.gather(
+                self._scene, self._patches, field, lights, where, selected[start:stop], replicates, first, count, seed,
+                io_sums,
             )  # fmt: skip
 
         size = max(64, min(4096, (1 << 17) // (replicates * count)))
-        self.workers.each_range(len(selected), size, call, on_step)
+        return sum(self.workers.each_range(len(selected), size, call, on_step))
 
     def direct(self, emitters, receivers, samples, seed, on_step=None):
         """Direct irradiance float32 (N, 3) [W/m^2], variance of its luminance float32 (N,), shadow rays traced."""
-        count = len(receivers)
-        irradiance, variance = np.zeros((count, 3), np.float32), np.zeros(count, np.float32)
+        irradiance, variance = np.zeros((len(receivers), 3), np.float32), np.zeros(len(receivers), np.float32)
+        lights, where = emitters.arrays(), receivers.arrays()
 
         def call(start, stop):
             return _kernel.direct(
-                self._scene, emitters.kinds, emitters.parameters, emitters.corners, emitters.radiances,
-                emitters.cumulative, receivers.positions, receivers.normals, receivers.triangle_sides, start,
-                stop - start, samples, seed, irradiance, variance,
+                self._scene, lights, where, start, stop - start, samples, seed, irradiance, variance
             )  # fmt: skip
 
-        if not len(emitters.kinds):
+        if not len(emitters):
             return irradiance, variance, 0
-        rays = self.workers.each_range(count, 2048, call, on_step)
-        return irradiance, variance, sum(rays)
+        return irradiance, variance, sum(self.workers.each_range(len(receivers), 2048, call, on_step))
 
 
 def rasterise_texels(uvs, width, height):

@@ -94,13 +94,14 @@ void pl_patches_destroy(pl_patches *patches);
 /*
  * Points spread evenly over patches, randomised quasi-Monte Carlo.
  *
- *   first, count      the range of patches
+ *   selected          count patches
  *   samples           points on each patch
  *   out_triangles     count * samples
  *   out_barycentrics  3 * count * samples floats
  */
-void pl_patch_points(const pl_patches *patches, size_t first, size_t count, uint32_t samples,
-                     uint32_t seed, int32_t *out_triangles, float *out_barycentrics);
+pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, size_t count,
+                          uint32_t samples, uint32_t seed, int32_t *out_triangles,
+                          float *out_barycentrics);
 
 /*
  * Form factors from some sides to all sides: the share of the power leaving a side that lands on each.
@@ -156,28 +157,6 @@ typedef struct pl_receivers {
 } pl_receivers;
 
 /*
- * Irradiance by gathering: the mean radiosity that cosine rays see (final gather).
- *
- *   radiosity      3 * 2 * patch_count, emission excluded where direct light is computed apart
- *   sky_radiosity  3: pi * the radiance of what rays see that leave the scene
- *   selected       count indices into the receivers; the sequence of a receiver hangs on its index only
- *   replicates     independent randomisations, 1..PL_MAX_REPLICATES; their spread is the error estimate
- *   first, count_rays  each replicate takes points first .. first + rays - 1 of its Sobol sequence;
- *                  powers of two are best
- *   io_sums        3 * replicates per selected receiver's index: sums of radiosity over rays, added to
- */
-enum { PL_MAX_REPLICATES = 8 };
-typedef struct pl_gather_rays {
-    uint32_t replicates;
-    uint32_t first;
-    uint32_t count;
-    uint32_t seed;
-} pl_gather_rays;
-void pl_gather(const pl_scene *scene, const pl_patches *patches, const float *radiosity,
-               const float sky_radiosity[3], const pl_receivers *receivers, const uint32_t *selected,
-               size_t count, pl_gather_rays rays, float *io_sums);
-
-/*
  * Emitters that direct light is sampled from.
  *
  * A row of `parameters` (PL_LIGHT_FLOATS floats) for each light, by kind:
@@ -203,6 +182,49 @@ typedef struct pl_lights {
     size_t triangle_count;
 } pl_lights;
 void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
+
+/*
+ * What gather rays see: the solution on the patches, and where it is too coarse to be taken as it is.
+ *
+ *   radiosity    3 * 2 * patch_count: reflected radiosity, emission left out
+ *   direct       3 * 2 * patch_count: the part of it that is the lights' direct light reflected once
+ *   reflectance  3 * patch_count
+ *   is_mixed     2 * patch_count: 1 where the lights reach one part of a side and not another: there a ray
+ *                samples the lights anew at the very point that it hits
+ *   reaches      patch_count: a ray that hits a patch from nearer than this [m] does not take the patch's
+ *                mean but goes on from the point hit, as the patch may lie half under something
+ *   sky          pi * the radiance of what rays see that leave the scene
+ */
+typedef struct pl_solution {
+    const float *radiosity;
+    const float *direct;
+    const float *reflectance;
+    const uint8_t *is_mixed;
+    const float *reaches;
+    float sky[3];
+} pl_solution;
+
+/*
+ * Irradiance by gathering: the mean radiosity that cosine rays see (final gather).
+ *
+ *   lights         as in pl_direct, for the sides that are mixed
+ *   selected       count indices into the receivers; the sequence of a receiver hangs on its index only
+ *   replicates     independent randomisations, 1..PL_MAX_REPLICATES; their spread is the error estimate
+ *   first, count   each replicate takes points first .. first + count - 1 of its Sobol sequence; powers
+ *                  of two are best
+ *   io_sums        3 * replicates per selected receiver's index: sums of radiosity over rays, added to
+ *   out_rays       all rays traced, shadow rays and those that went on included
+ */
+enum { PL_MAX_REPLICATES = 8 };
+typedef struct pl_gather_rays {
+    uint32_t replicates;
+    uint32_t first;
+    uint32_t count;
+    uint32_t seed;
+} pl_gather_rays;
+void pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
+               const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected,
+               size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays);
 
 /*
  * Direct irradiance from the lights: shadow rays, emitters chosen by what they would give unoccluded.

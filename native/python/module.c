@@ -130,26 +130,26 @@ static PyObject *create_patches(PyObject *self, PyObject *args) {
 }
 
 static PyObject *patch_points(PyObject *self, PyObject *args) {
-    PyObject *capsule, *objects[2];
-    Py_ssize_t first, count;
+    PyObject *capsule, *objects[3];
     unsigned samples, seed;
+    pl_status status;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OnnIIOO", &capsule, &first, &count, &samples, &seed, &objects[0],
-                          &objects[1]))
+    if (!PyArg_ParseTuple(args, "OOIIOO", &capsule, &objects[0], &samples, &seed, &objects[1], &objects[2]))
         return NULL;
     const pl_patches *patches = PyCapsule_GetPointer(capsule, PATCHES);
-    door_array arrays[] = {{"out_triangles", 'i', 1, count * (Py_ssize_t)samples, true, {0}},
-                           {"out_barycentrics", 'f', 3, count * (Py_ssize_t)samples, true, {0}}};
-    if (!patches || !door_arrays(objects, arrays, 2))
+    door_array arrays[] = {{"patches", 'i', 1, -1, false, {0}},
+                           {"out_triangles", 'i', 1, -1, true, {0}},
+                           {"out_barycentrics", 'f', 3, -1, true, {0}}};
+    if (!patches || !door_arrays(objects, arrays, 3))
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
-    pl_patch_points(patches, (size_t)first, (size_t)count, samples, seed, arrays[0].view.buf,
-                    arrays[1].view.buf);
+    status = pl_patch_points(patches, arrays[0].view.buf, door_rows(&arrays[0]), samples, seed,
+                             arrays[1].view.buf, arrays[2].view.buf);
     Py_END_ALLOW_THREADS
 
-    door_release(arrays, 2);
-    Py_RETURN_NONE;
+    door_release(arrays, 3);
+    return door_result(status);
 }
 
 static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
@@ -225,71 +225,109 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
     Py_RETURN_NONE;
 }
 
+/* The five arrays of a light table, as every function that samples lights takes them. */
+#define LIGHT_ARRAYS                                                                                        \
+    {"light_kinds", 'i', 1, -1, false, {0}}, {"light_parameters", 'f', PL_LIGHT_FLOATS, -1, false, {0}},    \
+        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 3, -1, false, {0}},             \
+        {"light_cumulative", 'f', 1, -1, false, {0}}
+enum { LIGHT_ARRAY_COUNT = 5, RECEIVER_ARRAY_COUNT = 3 };
+
+#define RECEIVER_ARRAYS                                                                                     \
+    {"positions", 'd', 3, -1, false, {0}}, {"normals", 'f', 3, -1, false, {0}},                             \
+        {"triangle_sides", 'i', 1, -1, false, {0}}
+
+static pl_lights lights_of(const door_array *arrays) {
+    return (pl_lights){arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
+                       arrays[3].view.buf, arrays[4].view.buf, door_rows(&arrays[4])};
+}
+
+static pl_receivers receivers_of(const door_array *arrays) {
+    return (pl_receivers){arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf};
+}
+
+/* Items of a tuple argument into objects[0..count); false with an exception if it is no tuple of that many. */
+static bool unpack(PyObject *tuple, Py_ssize_t count, PyObject **out_objects) {
+    if (!PyTuple_Check(tuple) || PyTuple_Size(tuple) != count) {
+        PyErr_Format(PyExc_TypeError, "expected a tuple of %zd arrays", count);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i)
+        out_objects[i] = PyTuple_GetItem(tuple, i);
+    return true;
+}
+
 static PyObject *gather(PyObject *self, PyObject *args) {
-    PyObject *capsules[2], *objects[7];
+    enum { FIELDS = 6, LIGHTS = FIELDS, RECEIVERS = LIGHTS + LIGHT_ARRAY_COUNT,
+           SELECTED = RECEIVERS + RECEIVER_ARRAY_COUNT, SUMS, ARRAYS };
+    PyObject *capsules[2], *solution_arrays, *light_arrays, *receiver_arrays, *objects[ARRAYS];
     pl_gather_rays rays;
+    uint64_t traced = 0;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOOOOOOIIIIO", &capsules[0], &capsules[1], &objects[0], &objects[1],
-                          &objects[2], &objects[3], &objects[4], &objects[5], &rays.replicates, &rays.first,
-                          &rays.count, &rays.seed, &objects[6]))
+    if (!PyArg_ParseTuple(args, "OOOOOOIIIIO", &capsules[0], &capsules[1], &solution_arrays, &light_arrays,
+                          &receiver_arrays, &objects[SELECTED], &rays.replicates, &rays.first, &rays.count,
+                          &rays.seed, &objects[SUMS]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
     door_array arrays[] = {{"radiosity", 'f', 3, -1, false, {0}},
-                           {"sky_radiosity", 'f', 3, 1, false, {0}},
-                           {"positions", 'd', 3, -1, false, {0}},
-                           {"normals", 'f', 3, -1, false, {0}},
-                           {"triangle_sides", 'i', 1, -1, false, {0}},
+                           {"direct", 'f', 3, -1, false, {0}},
+                           {"reflectance", 'f', 3, -1, false, {0}},
+                           {"is_mixed", 'B', 1, -1, false, {0}},
+                           {"reaches", 'f', 1, -1, false, {0}},
+                           {"sky", 'f', 3, 1, false, {0}},
+                           LIGHT_ARRAYS,
+                           RECEIVER_ARRAYS,
                            {"selected", 'I', 1, -1, false, {0}},
                            {"io_sums", 'f', 3, -1, true, {0}}};
-    if (!patches || !door_arrays(objects, arrays, 7))
+    if (!patches || !unpack(solution_arrays, FIELDS, objects) ||
+        !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects + LIGHTS) ||
+        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) ||
+        !door_arrays(objects, arrays, ARRAYS))
         return NULL;
-    const pl_receivers receivers = {arrays[2].view.buf, arrays[3].view.buf, arrays[4].view.buf};
+    const float *sky = arrays[5].view.buf;
+    const pl_solution solution = {arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf,
+                                  arrays[3].view.buf, arrays[4].view.buf, {sky[0], sky[1], sky[2]}};
+    const pl_lights lights = lights_of(arrays + LIGHTS);
+    const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
 
     Py_BEGIN_ALLOW_THREADS
-    pl_gather(scene, patches, arrays[0].view.buf, arrays[1].view.buf, &receivers, arrays[5].view.buf,
-              door_rows(&arrays[5]), rays, arrays[6].view.buf);
+    pl_gather(scene, patches, &solution, &lights, &receivers, arrays[SELECTED].view.buf,
+              door_rows(&arrays[SELECTED]), rays, arrays[SUMS].view.buf, &traced);
     Py_END_ALLOW_THREADS
 
-    door_release(arrays, 7);
-    Py_RETURN_NONE;
+    door_release(arrays, ARRAYS);
+    return PyLong_FromUnsignedLongLong(traced);
 }
 
 static PyObject *direct(PyObject *self, PyObject *args) {
-    PyObject *capsule, *objects[10];
+    enum { RECEIVERS = LIGHT_ARRAY_COUNT, IRRADIANCE = RECEIVERS + RECEIVER_ARRAY_COUNT, VARIANCE, ARRAYS };
+    PyObject *capsule, *light_arrays, *receiver_arrays, *objects[ARRAYS];
     Py_ssize_t first, count;
     unsigned samples, seed;
     uint64_t rays = 0;
     pl_status status;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOOOOOOOnnIIOO", &capsule, &objects[0], &objects[1], &objects[2],
-                          &objects[3], &objects[4], &objects[5], &objects[6], &objects[7], &first, &count,
-                          &samples, &seed, &objects[8], &objects[9]))
+    if (!PyArg_ParseTuple(args, "OOOnnIIOO", &capsule, &light_arrays, &receiver_arrays, &first, &count,
+                          &samples, &seed, &objects[IRRADIANCE], &objects[VARIANCE]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
-    door_array arrays[] = {{"light_kinds", 'i', 1, -1, false, {0}},
-                           {"light_parameters", 'f', PL_LIGHT_FLOATS, -1, false, {0}},
-                           {"light_corners", 'f', 9, -1, false, {0}},
-                           {"light_radiances", 'f', 3, -1, false, {0}},
-                           {"light_cumulative", 'f', 1, -1, false, {0}},
-                           {"positions", 'd', 3, -1, false, {0}},
-                           {"normals", 'f', 3, -1, false, {0}},
-                           {"triangle_sides", 'i', 1, -1, false, {0}},
+    door_array arrays[] = {LIGHT_ARRAYS,
+                           RECEIVER_ARRAYS,
                            {"out_irradiance", 'f', 3, -1, true, {0}},
                            {"out_variance", 'f', 1, -1, true, {0}}};
-    if (!scene || !door_arrays(objects, arrays, 10))
+    if (!scene || !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects) ||
+        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) ||
+        !door_arrays(objects, arrays, ARRAYS))
         return NULL;
-    const pl_lights lights = {arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]),
-                              arrays[2].view.buf, arrays[3].view.buf, arrays[4].view.buf,
-                              door_rows(&arrays[4])};
-    const pl_receivers receivers = {arrays[5].view.buf, arrays[6].view.buf, arrays[7].view.buf};
+    const pl_lights lights = lights_of(arrays);
+    const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_direct(scene, &lights, &receivers, (size_t)first, (size_t)count, samples, seed,
-                       arrays[8].view.buf, arrays[9].view.buf, &rays);
+                       arrays[IRRADIANCE].view.buf, arrays[VARIANCE].view.buf, &rays);
     Py_END_ALLOW_THREADS
 
-    door_release(arrays, 10);
+    door_release(arrays, ARRAYS);
     return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
 }
 
@@ -353,7 +391,7 @@ static PyMethodDef methods[] = {
     {"create_patches", create_patches, METH_VARARGS,
      "create_patches(apexes, first_rows, first_patches) -> patches"},
     {"patch_points", patch_points, METH_VARARGS,
-     "patch_points(patches, first, count, samples, seed, out_triangles, out_barycentrics)"},
+     "patch_points(layout, patches, samples, seed, out_triangles, out_barycentrics)"},
     {"form_factors_monte_carlo", form_factors_monte_carlo, METH_VARARGS,
      "form_factors_monte_carlo(scene, patches, sides, rays, seed, out_rows)"},
     {"form_factors_hemicube", form_factors_hemicube, METH_VARARGS,
@@ -362,11 +400,9 @@ static PyMethodDef methods[] = {
      "shoot(scene, patches, first_rays, first_samples, ray_flux, first, count, seed, io_received, "
      "io_escaped)"},
     {"gather", gather, METH_VARARGS,
-     "gather(scene, patches, radiosity, sky_radiosity, positions, normals, triangle_sides, selected, "
-     "replicates, first, count, seed, io_sums)"},
+     "gather(scene, patches, solution, lights, receivers, selected, replicates, first, count, seed, io_sums) -> rays"},
     {"direct", direct, METH_VARARGS,
-     "direct(scene, kinds, parameters, corners, radiances, cumulative, positions, normals, "
-     "triangle_sides, first, count, samples, seed, out_irradiance, out_variance) -> rays"},
+     "direct(scene, lights, receivers, first, count, samples, seed, out_irradiance, out_variance) -> rays"},
     {"rasterise_texels", rasterise_texels, METH_VARARGS,
      "rasterise_texels(uvs, width, height, out_triangles, out_distances, out_barycentrics)"},
     {"pack_charts", pack_charts, METH_VARARGS,

@@ -6,8 +6,9 @@
  * light has a closed form, rays decide only the visible share of it, so that an open sky of lamps has no noise.
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
+#include "direct.h"
+
 #include "lights.h"
-#include "receivers.h"
 #include "sampling.h"
 
 #include <stdlib.h>
@@ -21,6 +22,39 @@ typedef struct direct_job {
     float *importances; /* one per light, of the receiver at hand */
     uint64_t rays;
 } direct_job;
+
+bool direct_at_point(const pl_scene *scene, const pl_lights *lights, vec3 origin, vec3 normal,
+                     const float random[3], float out_rgb[3]) {
+    float total = 0, chosen_importance = 0, choice = random[0];
+    size_t chosen = 0;
+    pl_light_sample sample;
+    out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
+
+    /* one of all lights in proportion to its importance, in one pass (weighted reservoir sampling) */
+    for (size_t light = 0; light < lights->count; ++light) {
+        const float importance = light_importance(lights, light, origin, normal);
+        if (importance <= 0)
+            continue;
+        total += importance;
+        const float chance = importance / total;
+        if (choice < chance) {
+            chosen = light;
+            chosen_importance = importance;
+            choice /= chance;
+        } else {
+            choice = (choice - chance) / (1 - chance);
+        }
+    }
+    if (chosen_importance <= 0 ||
+        !light_sample(lights, chosen, origin, normal, random[1], random[2], &sample))
+        return false;
+    if (!is_occluded(scene, origin, sample.direction, sample.far)) {
+        transmit(scene, origin, sample.direction, sample.far, sample.irradiance);
+        for (int c = 0; c < 3; ++c)
+            out_rgb[c] = sample.irradiance[c] * total / chosen_importance;
+    }
+    return true;
+}
 
 /* A ray of a smooth receiver may have to leave through its own triangle, which the smooth surface is not. */
 static bool is_hidden_from_smooth(const pl_scene *scene, const pl_receiver_frame *frame, vec3 direction,
@@ -97,8 +131,8 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
                     io_totals[r][c] += sample.irradiance[c];
         return;
     }
-    const uint32_t most = samples / REPLICATES < 4 ? 4 : samples / REPLICATES;
-    const uint32_t few = most / 4 < 4 ? 4 : most / 4;
+    const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
+    const uint32_t few = most < 8 ? most : most / 8 < 4 ? 4 : most / 8;
     light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}, {{0}, {0}, 0, 0}};
     uint32_t visible = 0, taken = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {

@@ -1,9 +1,30 @@
 /*
  * Final gather: the irradiance at a receiver is the mean radiosity that cosine rays see.
+ *
+ * Where a patch is too coarse for that (hit from nearby, or lit in part), the ray looks closer: it samples the
+ * lights at the point it hits, or goes on from there. So light does not leak along patches that lie half under
+ * something, and contact stays dark, at any patch size.
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
+#include "direct.h"
 #include "patches.h"
-#include "receivers.h"
+
+enum { MOST_STEPS = 16 }; /* of a ray caught between surfaces that touch */
+
+typedef struct gather_job {
+    const pl_scene *scene;
+    const pl_patches *patches;
+    const pl_solution *solution;
+    const pl_lights *lights;
+    uint64_t rays;
+} gather_job;
+
+/* Numbers that hang on the ray's number and how often it has been asked; no sequence is shared. */
+typedef struct ray_random {
+    uint32_t seed, drawn;
+} ray_random;
+
+static float draw(ray_random *random) { return unit_float(hash_pair(random->seed, ++random->drawn)); }
 
 /*
  * The side that a ray of a smooth receiver takes its light from. Such a ray may start below the plane of its
@@ -17,27 +38,84 @@ static size_t smooth_side(const pl_patches *patches, const pl_receiver_frame *fr
     return starts_below && hit->is_back != frame->side ? side ^ 1u : side;
 }
 
-/* Add what one ray sees to the sum. */
-static void gather_ray(const pl_scene *scene, const pl_patches *patches, const float *radiosity,
-                       const float *sky_radiosity, const pl_receiver_frame *frame, vec3 direction,
-                       float *io_sum) {
-    const pl_hit hit = closest_hit(scene, frame->origin, direction, 0);
-    const float *seen = sky_radiosity;
-    if (hit.triangle >= 0) {
-        const size_t side = frame->is_smooth ? smooth_side(patches, frame, direction, &hit)
-                                             : hit_side(patches, &hit);
-        seen = radiosity + 3 * side;
-    }
-    float through[3] = {1, 1, 1};
-    if (scene->clear.bvh)
-        transmit(scene, frame->origin, direction, hit.distance, through);
+static void add(float *io_sum, const float *rgb, const float *weight) {
     for (int k = 0; k < 3; ++k)
-        io_sum[k] += seen[k] * through[k];
+        io_sum[k] += rgb[k] * weight[k];
 }
 
-void pl_gather(const pl_scene *scene, const pl_patches *patches, const float *radiosity,
-               const float sky_radiosity[3], const pl_receivers *receivers, const uint32_t *selected,
-               size_t count, pl_gather_rays rays, float *io_sums) {
+/* The point a ray hit, moved off the side that it sees. */
+static vec3 hit_point(const pl_scene *scene, const pl_hit *hit, vec3 normal) {
+    return point_off_triangle(scene, hit->triangle, scene_point(scene, hit->triangle, hit->u, hit->v), normal);
+}
+
+static vec3 hit_normal(const pl_scene *scene, const pl_hit *hit, size_t side) {
+    return vec3_scale(scene_normal(scene, hit->triangle), side & 1 ? -1.0f : 1.0f);
+}
+
+/* Direct light that a side reflects at the point hit: its mean, or sampled anew where it is mixed. */
+static void reflect_direct(gather_job *job, const pl_hit *hit, size_t side, ray_random *random,
+                           const float *weight, float *io_sum) {
+    const pl_solution *solution = job->solution;
+    if (!solution->is_mixed[side]) {
+        add(io_sum, solution->direct + 3 * side, weight);
+        return;
+    }
+    const vec3 normal = hit_normal(job->scene, hit, side);
+    const float numbers[3] = {draw(random), draw(random), draw(random)};
+    float rgb[3];
+    job->rays += direct_at_point(job->scene, job->lights, hit_point(job->scene, hit, normal), normal, numbers,
+                                 rgb);
+    for (int k = 0; k < 3; ++k)
+        io_sum[k] += rgb[k] * weight[k] * solution->reflectance[3 * (side / 2) + (size_t)k];
+}
+
+/* Add what one ray sees to the sum. */
+static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 direction, ray_random random,
+                       float *io_sum) {
+    const pl_solution *solution = job->solution;
+    float weight[3] = {1, 1, 1};
+    vec3 origin = frame->origin;
+
+    for (int step = 0; step < MOST_STEPS; ++step) {
+        const pl_hit hit = closest_hit(job->scene, origin, direction, 0);
+        ++job->rays;
+        if (job->scene->clear.bvh)
+            transmit(job->scene, origin, direction, hit.distance, weight);
+        if (hit.triangle < 0) {
+            add(io_sum, solution->sky, weight);
+            return;
+        }
+        const size_t side = step == 0 && frame->is_smooth
+                                ? smooth_side(job->patches, frame, direction, &hit)
+                                : hit_side(job->patches, &hit);
+        const bool is_far = hit.distance >= solution->reaches[side / 2];
+        if (is_far && !solution->is_mixed[side]) {
+            add(io_sum, solution->radiosity + 3 * side, weight);
+            return;
+        }
+        reflect_direct(job, &hit, side, &random, weight, io_sum);
+        if (is_far) {
+            for (size_t k = 3 * side; k < 3 * side + 3; ++k)
+                io_sum[k - 3 * side] += weight[k - 3 * side] * (solution->radiosity[k] - solution->direct[k]);
+            return;
+        }
+
+        /* too near to take the patch's mean: go on as the light would */
+        vec3 u, v;
+        const vec3 normal = hit_normal(job->scene, &hit, side);
+        vec3_basis(normal, &u, &v);
+        origin = hit_point(job->scene, &hit, normal);
+        const float x = draw(&random), y = draw(&random);
+        direction = cosine_direction(x, y, u, v, normal);
+        for (int k = 0; k < 3; ++k)
+            weight[k] *= solution->reflectance[3 * (side / 2) + (size_t)k];
+    }
+}
+
+void pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
+               const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected,
+               size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
+    gather_job job = {scene, patches, solution, lights, 0};
     for (size_t i = 0; i < count; ++i) {
         const pl_receiver_frame frame = receiver_frame(scene, receivers, selected[i]);
         vec3 u, v;
@@ -48,8 +126,9 @@ void pl_gather(const pl_scene *scene, const pl_patches *patches, const float *ra
             for (uint32_t k = rays.first; k < rays.first + rays.count; ++k) {
                 const vec3 direction = cosine_direction(sobol(k, 0, seed), sobol(k, 1, seed), u, v,
                                                         frame.shading);
-                gather_ray(scene, patches, radiosity, sky_radiosity, &frame, direction, sum);
+                gather_ray(&job, &frame, direction, (ray_random){hash_pair(seed, k), 0}, sum);
             }
         }
     }
+    *out_rays = job.rays;
 }

@@ -247,13 +247,14 @@ static void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 po
 
 static float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 normal) {
     const mesh_light light = mesh_of(p);
-    if (light.count <= EXACT_TRIANGLES) {
+    const vec3 to = vec3_sub(light.centre, point);
+    const float distance = vec3_length(to);
+    /* from far away the closed form says no more than the square law, and costs fifty times as much */
+    if (light.count <= EXACT_TRIANGLES && distance < 4 * light.radius) {
         float rgb[3];
         mesh_exact(lights, &light, point, normal, rgb);
         return luminance(rgb);
     }
-    const vec3 to = vec3_sub(light.centre, point);
-    const float distance = vec3_length(to);
     const float cosine = best_cosine(to, distance, light.radius, normal);
     const float nearest = fmaxf(distance, light.radius);
     return light.weight * fmaxf(0, cosine) / (nearest * nearest);

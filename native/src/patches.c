@@ -95,18 +95,23 @@ pl_barycentric point_in_patch(const pl_patches *patches, size_t patch, float x, 
     return (pl_barycentric){weights[1], weights[2]};
 }
 
-void pl_patch_points(const pl_patches *patches, size_t first, size_t count, uint32_t samples,
-                     uint32_t seed, int32_t *out_triangles, float *out_barycentrics) {
+pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, size_t count, uint32_t samples,
+                          uint32_t seed, int32_t *out_triangles, float *out_barycentrics) {
+    for (size_t i = 0; i < count; ++i)
+        if (selected[i] < 0 || (size_t)selected[i] >= patches->patch_count)
+            return PL_ERR_ARGUMENT;
     for (size_t i = 0; i < count; ++i) {
-        const uint32_t patch_seed = hash_pair(seed, (uint32_t)(first + i));
+        const size_t patch = (size_t)selected[i];
+        const uint32_t patch_seed = hash_pair(seed, (uint32_t)patch);
         for (uint32_t k = 0; k < samples; ++k) {
-            const pl_barycentric b = point_in_patch(patches, first + i, sobol(k, 0, patch_seed),
-                                                    sobol(k, 1, patch_seed));
+            const pl_barycentric b =
+                point_in_patch(patches, patch, sobol(k, 0, patch_seed), sobol(k, 1, patch_seed));
             const size_t at = i * samples + k;
-            out_triangles[at] = patch_triangle(patches, first + i);
+            out_triangles[at] = patch_triangle(patches, patch);
             out_barycentrics[3 * at] = 1 - b.weight_1 - b.weight_2;
             out_barycentrics[3 * at + 1] = b.weight_1;
             out_barycentrics[3 * at + 2] = b.weight_2;
         }
     }
+    return PL_OK;
 }

@@ -1,0 +1,108 @@
+"""The bake, as one straight line: triangles -> patches -> radiosity -> receivers -> irradiance -> lightmap or vertex colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .emitters import emitters_of
+from .gather import Irradiance, gather_irradiance
+from .kernel import KernelScene
+from .lightmap import Lightmap, assemble
+from .radiosity import Solved, solve_radiosity
+from .receivers import surface_receivers, vertex_receivers
+from .report import Report
+from .scene import Scene, SceneError, radiance_from_exitance
+from .settings import BakeSettings
+from .texels import texels
+from .unwrap import unwrap
+from .workers import OnProgress, Progress, Workers
+
+# how a bake's time falls to its stages, for the progress bar
+STAGE_SHARES = {"unwrap": 0.1, "texels": 0.05, "solve": 0.2, "gather": 0.65}
+
+
+@dataclass(frozen=True, slots=True)
+class BakeResult:
+    """What a bake gives; exactly one of ``lightmap`` and ``corner_colours`` is there.
+
+    Attributes
+    ----------
+    lightmap : pixels of E / pi and where every triangle lies in them
+    corner_colours : float32 (T, 3, 3) E / pi per triangle corner, NaN on triangles of objects that are not targets
+    report : seconds, rays, error, energy, warnings
+    """
+
+    lightmap: Lightmap | None
+    corner_colours: np.ndarray | None
+    report: Report
+
+
+def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = None) -> BakeResult:
+    """Light a scene: from triangles to E / pi on every texel or vertex of its target objects.
+
+    Raises SceneError or SettingsError for what cannot be baked, BakeCancelled when ``on_progress`` returns False.
+    """
+    if not any(obj.is_target and obj.count for obj in scene.objects):
+        raise SceneError("nothing to bake: the scene has no target object with faces")
+    progress = Progress(on_progress, STAGE_SHARES)
+    with Workers(settings.thread_count) as workers:
+        if settings.target == "lightmap":
+            progress.begin("unwrap")
+            charts = unwrap(scene, settings, progress.step)
+            progress.begin("texels")
+            texel_map = texels(scene, charts)
+            receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
+        else:
+            progress.begin("texels")
+            receivers, corner_means = vertex_receivers(scene, settings.smooth_angle_deg)
+
+        progress.begin("solve")
+        kernel = KernelScene(scene, workers)
+        emitters = emitters_of(scene, kernel.centre)
+        solved = solve_radiosity(scene, kernel, emitters, settings, progress.step)
+
+        progress.begin("gather")
+        irradiance = gather_irradiance(
+            kernel, emitters, solved.patches, receivers, settings.error, settings.seed,
+            lambda: settings.time_limit is not None and progress.elapsed > settings.time_limit, progress.step,
+        )  # fmt: skip
+
+        progress.begin("texels")
+        lightmap = corner_colours = None
+        if settings.target == "lightmap":
+            lightmap = assemble(irradiance.values, texel_map, charts)
+        else:
+            corner_colours = np.full((len(scene.triangles), 3, 3), np.nan, np.float32)
+            colours = radiance_from_exitance(corner_means.corner_values(irradiance.values))
+            corner_colours[corner_means.triangles] = colours
+        progress.end()
+    report = _report(scene, settings, progress, solved, irradiance, lightmap)
+    return BakeResult(lightmap, corner_colours, report)
+
+
+def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap) -> Report:
+    warnings = list(scene.warnings)
+    if not irradiance.target_reached:
+        warnings.append(
+            f"the target error {settings.error:g} was not reached: sampling stopped at an estimated "
+            f"{irradiance.relative_error:.3g}" + (" by the time limit" if settings.time_limit else "")
+        )
+    return Report(
+        seconds=progress.seconds,
+        rays={**solved.rays, **irradiance.rays},
+        triangles=len(scene.triangles),
+        patches=len(solved.patches),
+        receivers=len(irradiance.values),
+        lightmap_size=lightmap.pixels.shape[1::-1] if lightmap else None,
+        method=solved.method,
+        solver=solved.solution.solver,
+        choice=solved.choice,
+        residuals=solved.solution.residuals,
+        estimated_error=irradiance.relative_error,
+        target_error=settings.error,
+        target_reached=irradiance.target_reached,
+        energy=solved.solution.energy,
+        warnings=tuple(warnings),
+    )

@@ -1,0 +1,141 @@
+"""Everything that direct light is sampled from, as the kernel's table: lamps, suns, and glowing triangles in groups."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scene import AreaLight, PointLight, Scene, SunLight
+from .textures import textured_colours
+
+POINT, AREA, SUN, MESH = 0, 1, 2, 3
+LIGHT_FLOATS = 20
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+MOST_GROUPS = 96  # groups of glowing triangles, about: each receiver weighs every group
+GROUP_TRIANGLES = 8  # a group of no more has a closed form in the kernel
+TEXTURE_CUTS = 8  # a triangle whose glow is an image is cut into so many squared
+
+
+@dataclass(frozen=True, slots=True)
+class Emitters:
+    """Rows of the kernel's light table (native/include/patchlight.h, pl_lights), relative to the scene's centre."""
+
+    kinds: np.ndarray  # int32 (L,)
+    parameters: np.ndarray  # float32 (L, LIGHT_FLOATS)
+    corners: np.ndarray  # float32 (N, 9) of glowing triangles
+    radiances: np.ndarray  # float32 (N, 3)
+    cumulative: np.ndarray  # float32 (N,) chance of the group's triangles before each
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    def arrays(self) -> tuple:
+        """In the kernel's order."""
+        return self.kinds, self.parameters, self.corners, self.radiances, self.cumulative
+
+
+def emitters_of(scene: Scene, centre) -> Emitters:
+    """The scene's lights and glowing triangles; ``centre`` is what the kernel re-centred by [m]."""
+    kinds, rows = [], []
+    for light in scene.lights:
+        kind, row = _light_row(light, np.asarray(centre))
+        kinds.append(kind)
+        rows.append(row)
+    corners, radiances = _glowing_triangles(scene)
+    corners = corners - np.asarray(centre)
+    order, groups = _groups(corners, radiances)
+    corners, radiances = corners[order], radiances[order]
+    cumulative = np.zeros(len(corners))
+    for first, count in groups:
+        span = slice(first, first + count)
+        row, cumulative[span] = _group_row(corners[span], radiances[span], first)
+        kinds.append(MESH)
+        rows.append(row)
+    return Emitters(
+        kinds=np.array(kinds, np.int32),
+        parameters=np.array([row + [0.0] * (LIGHT_FLOATS - len(row)) for row in rows], np.float32).reshape(-1, 20),
+        corners=corners.reshape(-1, 9).astype(np.float32),
+        radiances=radiances.astype(np.float32),
+        cumulative=cumulative.astype(np.float32),
+    )
+
+
+def _light_row(light, centre):
+    if isinstance(light, PointLight):
+        position = np.asarray(light.position) - centre
+        soft = float(light.soft_falloff and light.radius > 0)
+        return POINT, [*position, *light.intensity, light.radius, soft, *light.direction, *light.cone_cosines]
+    if isinstance(light, AreaLight):
+        position = np.asarray(light.centre) - centre
+        shape = [float(light.is_ellipse), light.spread]
+        return AREA, [*position, *light.radiance, *light.axis_u, *light.axis_v, *shape]
+    if isinstance(light, SunLight):
+        towards = -np.asarray(light.direction) / np.linalg.norm(light.direction)
+        return SUN, [*towards, *light.irradiance, 0.5 * light.angle]
+    raise TypeError(f"{type(light).__name__} is not a light")
+
+
+def _glowing_triangles(scene):
+    """World corners float64 (N, 3, 3) and radiance (N, 3) of all triangles that emit."""
+    emits = np.array([m.emits for m in scene.materials], bool)
+    is_image = np.array([m.radiance_texture is not None for m in scene.materials], bool)
+    plain = np.flatnonzero((emits & ~is_image)[scene.triangle_materials])
+    cut = np.flatnonzero((emits & is_image)[scene.triangle_materials])
+    weights, middles = _cuts(TEXTURE_CUTS)
+
+    corners, triangles = scene.corners[plain], np.repeat(cut, len(weights))
+    pieces = np.einsum("pkb,tbc->tpkc", weights, scene.corners[cut]).reshape(-1, 3, 3)
+    factors = np.array([m.radiance for m in scene.materials]).reshape(-1, 3)
+    glow = textured_colours(scene, triangles, np.tile(middles, (len(cut), 1)), "radiance", "radiance_texture")
+    corners = np.concatenate([corners, pieces])
+    radiances = np.concatenate([factors[scene.triangle_materials[plain]], glow])
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    keep = (areas > 0) & (radiances.max(axis=1, initial=0.0) > 0)
+    return corners[keep], radiances[keep]
+
+
+def _cuts(n):
+    """A triangle cut into n^2 alike: corner weights (n^2, 3, 3), middles (n^2, 3)."""
+    pieces = []
+    for i in range(n):
+        for j in range(n - i):
+            pieces.append([(i, j), (i + 1, j), (i, j + 1)])
+            if i + j < n - 1:
+                pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
+    ij = np.array(pieces, float) / n
+    weights = np.concatenate([1 - ij.sum(axis=2, keepdims=True), ij], axis=2)
+    return weights, weights.mean(axis=1).astype(np.float32)
+
+
+def _groups(corners, radiances):
+    """Order of the triangles, and (first, count) of each group in it: near each other, split where the most light is."""
+    middles = corners.mean(axis=1)
+    flux = _flux(corners, radiances)
+    waiting, done = ([np.arange(len(corners))] if len(corners) else []), []
+    while waiting:
+        waiting.sort(key=lambda group: flux[group].sum())
+        group = waiting.pop()
+        extent = np.ptp(middles[group], axis=0)
+        if len(group) <= GROUP_TRIANGLES or len(waiting) + len(done) + 2 > MOST_GROUPS or extent.max() <= 0:
+            done.append(group)
+            continue
+        ranked = group[np.argsort(middles[group, np.argmax(extent)], kind="stable")]
+        waiting += [ranked[: len(ranked) // 2], ranked[len(ranked) // 2 :]]
+    firsts = np.concatenate([[0], np.cumsum([len(group) for group in done])]).astype(int)
+    order = np.concatenate(done) if done else np.zeros(0, int)
+    return order, [(int(first), len(group)) for first, group in zip(firsts, done)]
+
+
+def _flux(corners, radiances):
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return areas * (radiances @ LUMINANCE + 1e-6 * radiances.max(axis=1, initial=0.0))
+
+
+def _group_row(corners, radiances, first):
+    flux = _flux(corners, radiances)
+    middle = 0.5 * (corners.reshape(-1, 3).min(axis=0) + corners.reshape(-1, 3).max(axis=0))
+    radius = np.linalg.norm(corners.reshape(-1, 3) - middle, axis=1).max()
+    cumulative = np.concatenate([[0.0], np.cumsum(flux)[:-1]]) / flux.sum()
+    return [*middle, radius, flux.sum(), first, len(corners)], cumulative

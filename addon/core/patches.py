@@ -1,0 +1,119 @@
+"""Patches: triangles cut into pieces of about one size, each with one unknown radiosity a side.
+
+A patch never spans two triangles, and one triangle is never more than its share of all patches, so that a ground plane
+around the house does not take the patches away from its rooms. The layout is in native/include/patchlight.h.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .kernel import KernelScene
+from .scene import Scene
+from .textures import textured_colours
+
+TEXTURE_SAMPLES = 8  # points a patch on which its texture is averaged
+LARGEST_SHARE = 1 / 8  # of all patches that one triangle may take
+
+
+@dataclass(frozen=True, slots=True)
+class Patches:
+    """The pieces that carry radiosity; unknown 2 p is patch p's front, 2 p + 1 its back.
+
+    Attributes
+    ----------
+    size : longest edge of a patch, about [m]
+    areas : float64 (P,) [m^2]
+    triangles : int32 (P,) which triangle each is part of
+    reflectance : float32 (P, 3) rho, the mean over the patch; 0 where the material transmits
+    """
+
+    size: float
+    areas: np.ndarray
+    triangles: np.ndarray
+    reflectance: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.areas)
+
+    @property
+    def side_areas(self):
+        """Area of each unknown's side, float64 (2 P,) [m^2]."""
+        return np.repeat(self.areas, 2)
+
+    @property
+    def side_reflectance(self):
+        """Reflectance of each unknown, float32 (2 P, 3)."""
+        return np.repeat(self.reflectance, 2, axis=0)
+
+
+def triangle_areas(scene: Scene):
+    """Areas of the triangles, float64 (T,) [m^2]."""
+    a, b, c = np.moveaxis(scene.corners, 1, 0)
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def patch_size_for(scene: Scene, budget: int) -> float:
+    """The patch size [m] at which the scene's triangles come to about ``budget`` patches."""
+    areas = triangle_areas(scene)
+    low, high = 1e-9 * max(areas.max(initial=0.0), 1e-12), max(areas.sum(), 1e-12)
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        pieces = np.minimum(areas / middle, budget * LARGEST_SHARE).sum()
+        low, high = (middle, high) if pieces > budget else (low, middle)
+    return float(np.sqrt(high))
+
+
+def subdivide(scene: Scene, kernel: KernelScene, size: float, budget: int, seed: int) -> Patches:
+    """Cut every triangle into patches of at most about ``size`` [m] and tell the kernel of them."""
+    areas = triangle_areas(scene)
+    # a triangle that would take more than its share gets larger patches
+    sizes = np.maximum(size, np.sqrt(areas / (budget * LARGEST_SHARE)))
+    apexes, longest = _apexes(scene)
+    rows = np.maximum(1, np.ceil(2 * areas / np.maximum(longest * sizes, 1e-300) - 1e-6)).astype(np.int64)
+    first_rows = _offsets(rows)
+
+    row_triangle = np.repeat(np.arange(len(areas)), rows)
+    row = np.arange(first_rows[-1]) - first_rows[row_triangle]
+    height = rows[row_triangle]
+    widths = longest[row_triangle] * (1 - row / height)
+    columns = np.maximum(1, np.ceil(widths / sizes[row_triangle] - 1e-6)).astype(np.int64)
+    first_patches = _offsets(columns)
+    kernel.set_patches(apexes, first_rows.astype(np.int32), first_patches.astype(np.int32))
+
+    # a row's share of the triangle: its width falls linearly, so area goes with the difference of squares
+    shares = ((1 - row / height) ** 2 - (1 - (row + 1) / height) ** 2) / columns
+    row_areas = areas[row_triangle] * shares
+    triangles = np.repeat(row_triangle, columns).astype(np.int32)
+    return Patches(
+        size=size,
+        areas=np.repeat(row_areas, columns),
+        triangles=triangles,
+        reflectance=_mean_reflectance(scene, kernel, triangles, seed),
+    )
+
+
+def _apexes(scene):
+    """The corner opposite to each triangle's longest edge, uint8 (T,), and that edge's length [m]."""
+    corners = scene.corners
+    edges = np.stack([np.linalg.norm(corners[:, (k + 2) % 3] - corners[:, (k + 1) % 3], axis=1) for k in range(3)], 1)
+    apexes = np.argmax(edges, axis=1) if len(edges) else np.zeros(0, np.int64)
+    return apexes.astype(np.uint8), edges[np.arange(len(edges)), apexes]
+
+
+def _offsets(counts):
+    return np.concatenate([[0], np.cumsum(counts)])
+
+
+def _mean_reflectance(scene, kernel, triangles, seed):
+    factors = np.array([m.reflectance for m in scene.materials], np.float32).reshape(-1, 3)
+    materials = scene.triangle_materials[triangles]
+    reflectance = factors[materials]
+    is_textured = np.array([m.reflectance_texture is not None for m in scene.materials], bool)[materials]
+    textured = np.flatnonzero(is_textured)
+    points, barycentrics = kernel.patch_points(textured, TEXTURE_SAMPLES, seed)
+    colours = textured_colours(scene, points, barycentrics, "reflectance", "reflectance_texture")
+    reflectance[textured] = colours.reshape(-1, TEXTURE_SAMPLES, 3).mean(axis=1)
+    return np.clip(reflectance, 0.0, 1.0)

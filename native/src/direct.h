@@ -1,0 +1,14 @@
+/* Direct light at one point. SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef PATCHLIGHT_DIRECT_H
+#define PATCHLIGHT_DIRECT_H
+
+#include "receivers.h"
+
+/*
+ * One-sample estimate of the direct irradiance at a point off a surface: one light in proportion to what it
+ * would give, one shadow ray. Three random numbers in [0, 1). Returns whether a ray was traced.
+ */
+bool direct_at_point(const pl_scene *scene, const pl_lights *lights, vec3 origin, vec3 normal,
+                     const float random[3], float out_rgb[3]);
+
+#endif
