@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import ctypes
 import json
 import os
 import signal
@@ -244,18 +245,18 @@ def _blender():
 
 @contextlib.contextmanager
 def _silent_stdout():
-    """Send what is written to file descriptor 1, also by C code, to nowhere."""
+    """Send to nowhere what Python writes to stdout, and what C code writes to file descriptor 1."""
     sys.stdout.flush()
     kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    os.close(nowhere)
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        os.dup2(kept, 1)
-        os.close(kept)
+    with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
+        os.dup2(nowhere.fileno(), 1)
+        try:
+            yield
+        finally:
+            if os.name == "posix":
+                ctypes.CDLL(None).fflush(None)  # what C still holds back would come out after this
+            os.dup2(kept, 1)
+            os.close(kept)
 
 
 @contextlib.contextmanager
