@@ -24,7 +24,7 @@ FULL_ENOUGH = 0.985  # of the texels asked for
 ATTEMPTS = 8
 WIDTHS = (0.71, 0.84, 1.19, 1.41)  # other widths than the square's, where large charts leave gaps
 FINE_WIDTHS = tuple(0.6 + 0.05 * step for step in range(21))
-FEW_CHARTS = 300  # so quickly packed that all of these are tried
+FEW_CHARTS = 300  # in an atlas of single texels: so quickly packed that all of these are tried
 LARGE_CHART = 0.2  # of the width
 
 
@@ -71,7 +71,7 @@ def _pack_into(flat, texels):
     best = _densest(flat, texels, width, math.sqrt(0.7 * texels / _area(flat)))
     if flat.sizes.max() * best.density < LARGE_CHART * width:
         return best
-    if flat.chart_count <= FEW_CHARTS:
+    if flat.chart_count <= FEW_CHARTS and width <= MOST_BLOCKS:
         others = [_densest(flat, texels, round(width * factor), best.density) for factor in FINE_WIDTHS]
         return max([best, *others], key=lambda packing: packing.density)
     others = [_pack_once(flat, best.density, round(width * factor)) for factor in WIDTHS]
