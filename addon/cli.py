@@ -147,7 +147,8 @@ def run_bake(args: argparse.Namespace) -> None:
         with _timed(seconds, "read"):
             prepared = bake_scene.prepare(bpy.context.scene, settings, args.objects, args.subdivide)
         result = bake(prepared.scene, settings, progress)
-        with _uninterrupted():
+        # from here on Ctrl-C waits until the files are whole: the bake has succeeded and its result is kept
+        with _on_ctrl_c(signal.SIG_IGN):
             with _timed(seconds, "write"):
                 bake_scene.write(prepared, result)
             with _timed(seconds, "save"):
@@ -236,11 +237,8 @@ def _blender():
                 raise
             raise CommandError(NO_BLENDER) from error
         # Blender sets its own handler, which stops nothing of ours
-        before = signal.signal(signal.SIGINT, signal.default_int_handler)
-        try:
+        with _on_ctrl_c(signal.default_int_handler):
             yield bpy
-        finally:
-            signal.signal(signal.SIGINT, before)
 
 
 @contextlib.contextmanager
@@ -260,13 +258,14 @@ def _silent_stdout():
 
 
 @contextlib.contextmanager
-def _uninterrupted():
-    """Ctrl-C waits until the files are whole; by then the bake has succeeded and its result is kept."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _on_ctrl_c(handler):
+    before = signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        # None: it was set by C code, inside Blender, and Python cannot set it again; the command is over anyway
+        if before is not None:
+            signal.signal(signal.SIGINT, before)
 
 
 @contextlib.contextmanager
