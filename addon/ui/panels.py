@@ -28,7 +28,7 @@ class PATCHLIGHT_PT_bake(_Sidebar, bpy.types.Panel):
         column.prop(options, "method")
         column.prop(options, "error")
         if options.target == "lightmap":
-            column.prop(options, "size_mode", expand=True)
+            column.row().prop(options, "size_mode", expand=True)
             column.prop(options, "size" if options.size_mode == "SIZE" else "density")
             column.prop(options, "keep_uvs")
         else:
