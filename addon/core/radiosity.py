@@ -20,10 +20,10 @@ PATCH_BUDGETS = {"direct": 1200, "progressive": 3000, "stochastic": 30000}
 DIRECT_TRIANGLES, PROGRESSIVE_TRIANGLES = 150, 1500  # up to which "auto" takes them
 POINTS = 8  # of a patch side: where its direct light is measured
 SMALL = 0.25  # of a full-size patch's area: smaller ones are measured at one point
-PATCH_SHADOW_SAMPLES = 8
-PATCH_SKY_RAYS = 16
+PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 1
+PATCH_SKY_RAYS = 4  # of each point
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
-MIXED = 0.1  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
+MIXED = 0.25  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
 REACH = 2.0  # patch sizes: nearer hits go on from the point hit
 
 
@@ -140,7 +140,7 @@ def _direct_on_patches(scene, kernel, patches: Patches, emitters, seed, on_step)
     rays = 0
     for chosen, points, share in _measured(patches):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
-        values, _, traced = kernel.direct(emitters, receivers, PATCH_SHADOW_SAMPLES, seed)
+        values, _, traced = kernel.direct(emitters, receivers, min(points, PATCH_SHADOW_SAMPLES), seed)
         values = values.reshape(-1, 2, points, 3)
         irradiance[chosen] = values.mean(axis=2, dtype=np.float64)
         spread[chosen] = np.ptp(values.mean(axis=3), axis=2)
@@ -169,7 +169,7 @@ def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
         sums = np.zeros((len(receivers), 1, 3), np.float32)
         everyone = np.arange(len(receivers), dtype=np.uint32)
-        count = PATCH_SKY_RAYS // points
+        count = PATCH_SKY_RAYS
         rays += kernel.gather(black, emitters, receivers, everyone, 1, 0, count, seed, sums)
         irradiance[chosen] = (sums[:, 0] / count).reshape(-1, 2, points, 3).mean(axis=2, dtype=np.float64)
     return irradiance.reshape(-1, 3), rays

@@ -9,6 +9,7 @@ import numpy as np
 from .kernel import KernelScene
 from .scene import Scene
 
+EDGE_INSET = 1e-3  # of a triangle: receivers keep so far off its edges
 INSET = 1 / 12  # of a triangle: a vertex is where surfaces touch, so its receivers stand a little inside their faces
 
 
@@ -37,7 +38,9 @@ class Receivers:
 
 def surface_receivers(scene: Scene, triangles, barycentrics) -> Receivers:
     """Receivers on the fronts of triangles (N,) at barycentrics (N, 3)."""
-    weights = barycentrics.astype(np.float64)
+    # exactly on an edge a ray can slip between the face and the wall that stands on it
+    weights = np.maximum(barycentrics.astype(np.float64), EDGE_INSET)
+    weights /= weights.sum(axis=1, keepdims=True)
     corners = scene.corners[triangles]
     corner_normals = scene.corner_normals[triangles].astype(np.float64)
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -222,9 +222,9 @@ typedef struct pl_gather_rays {
     uint32_t count;
     uint32_t seed;
 } pl_gather_rays;
-void pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
-               const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected,
-               size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays);
+pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
+                    const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected,
+                    size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays);
 
 /*
  * Direct irradiance from the lights: shadow rays, emitters chosen by what they would give unoccluded.

@@ -262,6 +262,7 @@ static PyObject *gather(PyObject *self, PyObject *args) {
     PyObject *capsules[2], *solution_arrays, *light_arrays, *receiver_arrays, *objects[ARRAYS];
     pl_gather_rays rays;
     uint64_t traced = 0;
+    pl_status status;
     (void)self;
     if (!PyArg_ParseTuple(args, "OOOOOOIIIIO", &capsules[0], &capsules[1], &solution_arrays, &light_arrays,
                           &receiver_arrays, &objects[SELECTED], &rays.replicates, &rays.first, &rays.count,
@@ -291,12 +292,12 @@ static PyObject *gather(PyObject *self, PyObject *args) {
     const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
 
     Py_BEGIN_ALLOW_THREADS
-    pl_gather(scene, patches, &solution, &lights, &receivers, arrays[SELECTED].view.buf,
+    status = pl_gather(scene, patches, &solution, &lights, &receivers, arrays[SELECTED].view.buf,
               door_rows(&arrays[SELECTED]), rays, arrays[SUMS].view.buf, &traced);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, ARRAYS);
-    return PyLong_FromUnsignedLongLong(traced);
+    return status == PL_OK ? PyLong_FromUnsignedLongLong(traced) : door_result(status);
 }
 
 static PyObject *direct(PyObject *self, PyObject *args) {

@@ -8,7 +8,6 @@
  */
 #include "direct.h"
 
-#include "lights.h"
 #include "sampling.h"
 
 #include <stdlib.h>
@@ -19,39 +18,41 @@ typedef struct direct_job {
     const pl_scene *scene;
     const pl_lights *lights;
     uint32_t samples, seed;
+    pl_light_balls balls;
     float *importances; /* one per light, of the receiver at hand */
     uint64_t rays;
 } direct_job;
 
-bool direct_at_point(const pl_scene *scene, const pl_lights *lights, vec3 origin, vec3 normal,
-                     const float random[3], float out_rgb[3]) {
-    float total = 0, chosen_importance = 0, choice = random[0];
+/* The light at which the running sum of importances passes `choice` of the total. */
+static size_t choose_light(const float *importances, size_t count, float total, float choice) {
+    float passed = 0;
     size_t chosen = 0;
+    for (size_t light = 0; light < count; ++light) {
+        if (importances[light] <= 0)
+            continue;
+        chosen = light;
+        passed += importances[light];
+        if (passed > choice * total)
+            break;
+    }
+    return chosen;
+}
+
+bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_light_balls *balls,
+                     float *importances, vec3 origin, vec3 normal, const float random[3],
+                     float out_rgb[3]) {
     pl_light_sample sample;
     out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
-
-    /* one of all lights in proportion to its importance, in one pass (weighted reservoir sampling) */
-    for (size_t light = 0; light < lights->count; ++light) {
-        const float importance = light_importance(lights, light, origin, normal);
-        if (importance <= 0)
-            continue;
-        total += importance;
-        const float chance = importance / total;
-        if (choice < chance) {
-            chosen = light;
-            chosen_importance = importance;
-            choice /= chance;
-        } else {
-            choice = (choice - chance) / (1 - chance);
-        }
-    }
-    if (chosen_importance <= 0 ||
-        !light_sample(lights, chosen, origin, normal, random[1], random[2], &sample))
+    const float total = light_importances(lights, balls, origin, normal, importances);
+    if (total <= 0)
+        return false;
+    const size_t chosen = choose_light(importances, lights->count, total, random[0]);
+    if (!light_sample(lights, chosen, origin, normal, random[1], random[2], &sample))
         return false;
     if (!is_occluded(scene, origin, sample.direction, sample.far)) {
         transmit(scene, origin, sample.direction, sample.far, sample.irradiance);
         for (int c = 0; c < 3; ++c)
-            out_rgb[c] = sample.irradiance[c] * total / chosen_importance;
+            out_rgb[c] = sample.irradiance[c] * total / importances[chosen];
     }
     return true;
 }
@@ -173,16 +174,6 @@ static void add_weak_lights(direct_job *job, const pl_receiver_frame *frame, flo
     }
 }
 
-static float measure_lights(direct_job *job, const pl_receiver_frame *frame) {
-    float total = 0;
-    for (size_t light = 0; light < job->lights->count; ++light) {
-        job->importances[light] =
-            light_importance(job->lights, light, frame->origin, frame->shading);
-        total += job->importances[light];
-    }
-    return total;
-}
-
 static uint32_t share_of(uint32_t samples, float part, float total) {
     const float share = ceilf((float)samples * part / total);
     return share < 1 ? 1 : share > (float)samples ? samples : (uint32_t)share;
@@ -191,7 +182,8 @@ static uint32_t share_of(uint32_t samples, float part, float total) {
 static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint32_t seed,
                            float out_rgb[3], float *out_variance) {
     float totals[REPLICATES][3] = {{0}};
-    const float total = measure_lights(job, frame);
+    const float total = light_importances(job->lights, &job->balls, frame->origin, frame->shading,
+                                          job->importances);
     const float threshold = total / (2 * (float)job->samples);
     float weak = 0;
 
@@ -220,14 +212,17 @@ pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_rec
                     float *out_irradiance, float *out_variance, uint64_t *out_rays) {
     direct_job job = {.scene = scene, .lights = lights, .samples = samples ? samples : 1, .seed = seed};
     job.importances = malloc(sizeof(float) * (lights->count + 1));
-    if (!job.importances)
+    if (!job.importances || !light_balls_create(lights, &job.balls)) {
+        free(job.importances);
         return PL_ERR_MEMORY;
+    }
     for (size_t i = first; i < first + count; ++i) {
         const pl_receiver_frame frame = receiver_frame(scene, receivers, i);
         light_receiver(&job, &frame, hash_pair(seed, (uint32_t)i), out_irradiance + 3 * i,
                        out_variance + i);
     }
     *out_rays = job.rays;
+    light_balls_destroy(&job.balls);
     free(job.importances);
     return PL_OK;
 }

@@ -9,6 +9,8 @@
 #include "direct.h"
 #include "patches.h"
 
+#include <stdlib.h>
+
 enum { MOST_STEPS = 16 }; /* of a ray caught between surfaces that touch */
 
 typedef struct gather_job {
@@ -16,6 +18,8 @@ typedef struct gather_job {
     const pl_patches *patches;
     const pl_solution *solution;
     const pl_lights *lights;
+    pl_light_balls balls;
+    float *importances; /* room for one number a light */
     uint64_t rays;
 } gather_job;
 
@@ -63,8 +67,8 @@ static void reflect_direct(gather_job *job, const pl_hit *hit, size_t side, ray_
     const vec3 normal = hit_normal(job->scene, hit, side);
     const float numbers[3] = {draw(random), draw(random), draw(random)};
     float rgb[3];
-    job->rays += direct_at_point(job->scene, job->lights, hit_point(job->scene, hit, normal), normal, numbers,
-                                 rgb);
+    job->rays += direct_at_point(job->scene, job->lights, &job->balls, job->importances,
+                                 hit_point(job->scene, hit, normal), normal, numbers, rgb);
     for (int k = 0; k < 3; ++k)
         io_sum[k] += rgb[k] * weight[k] * solution->reflectance[3 * (side / 2) + (size_t)k];
 }
@@ -112,10 +116,15 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
     }
 }
 
-void pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
+pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
                const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected,
                size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
-    gather_job job = {scene, patches, solution, lights, 0};
+    gather_job job = {.scene = scene, .patches = patches, .solution = solution, .lights = lights};
+    job.importances = malloc(sizeof(float) * (lights->count + 1));
+    if (!job.importances || !light_balls_create(lights, &job.balls)) {
+        free(job.importances);
+        return PL_ERR_MEMORY;
+    }
     for (size_t i = 0; i < count; ++i) {
         const pl_receiver_frame frame = receiver_frame(scene, receivers, selected[i]);
         vec3 u, v;
@@ -131,4 +140,7 @@ void pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_soluti
         }
     }
     *out_rays = job.rays;
+    light_balls_destroy(&job.balls);
+    free(job.importances);
+    return PL_OK;
 }

@@ -6,6 +6,8 @@
 
 #include "polygon.h"
 
+#include <stdlib.h>
+
 enum { EXACT_TRIANGLES = 8 }; /* a mesh light of no more is summed exactly: Lambert's formula is 0.2 us */
 
 typedef struct point_light {
@@ -47,14 +49,6 @@ static void scaled(const float rgb[3], float factor, float out_rgb[3]) {
         out_rgb[k] = rgb[k] * factor;
 }
 
-/* Largest cosine that any part of a ball around the light can have, seen from the receiver. */
-static float best_cosine(vec3 to_centre, float distance, float radius, vec3 normal) {
-    if (distance <= radius)
-        return 1;
-    const float cosine = vec3_dot(to_centre, normal) / distance;
-    return fminf(1, cosine + radius / distance);
-}
-
 /* Smoothstep from the cone's edge inwards. */
 static float cone_share(const point_light *light, vec3 from_light) {
     if (light->cos_inner < -1)
@@ -65,20 +59,15 @@ static float cone_share(const point_light *light, vec3 from_light) {
     return t * t * (3 - 2 * t);
 }
 
-static float point_importance(const point_light *light, const float *intensity, vec3 point, vec3 normal) {
+/* What a spot's cone lets through of its ball's importance. */
+static float cone_importance(const point_light *light, vec3 point) {
     const vec3 to = vec3_sub(light->position, point);
     const float distance = vec3_length(to);
-    const float cosine = best_cosine(to, distance, light->radius, normal);
-    if (cosine <= 0 || distance <= 0)
-        return 0;
-    float cone = 1;
+    if (distance <= light->radius)
+        return 1;
+    const float share = cone_share(light, vec3_scale(to, -1 / distance));
     /* a sphere's edge can look into a cone that its centre is out of */
-    if (light->cos_inner >= -1 && distance > light->radius) {
-        cone = cone_share(light, vec3_scale(to, -1 / distance));
-        cone = fmaxf(cone, light->radius > 0 ? 0.01f : 0);
-    }
-    const float nearest = fmaxf(distance, light->radius);
-    return luminance(intensity) * cone * cosine / (nearest * nearest);
+    return fmaxf(share, light->radius > 0 ? 0.01f : 0);
 }
 
 /* A uniform direction in the cone that a sphere fills, or a point of the disc that faces the receiver. */
@@ -192,22 +181,18 @@ static float area_of_lamp(const area_light *light) {
     return light->is_ellipse > 0 ? 0.25f * PL_PI * rectangle : rectangle;
 }
 
-static float area_importance(const area_light *light, const float *radiance, vec3 point, vec3 normal) {
+/* Near an area lamp the closed form; from far away, it says no more than the square law at fifty times the cost. */
+static float area_importance(const area_light *light, const float *radiance, vec3 point, vec3 normal,
+                             float ball) {
     if (!area_faces(light, point))
         return 0;
-    if (area_is_exact(light)) {
-        vec3 corners[4];
-        area_corners(light, corners);
-        return PL_PI * luminance(radiance) * (float)point_to_polygon(point, normal, corners, 4);
-    }
+    const float reach = 4 * vec3_length(vec3_add(light->axis_u, light->axis_v));
     const vec3 to = vec3_sub(light->centre, point);
-    const float distance = vec3_length(to);
-    const float radius = vec3_length(vec3_add(light->axis_u, light->axis_v));
-    const float cosine = best_cosine(to, distance, radius, normal);
-    const float nearest = fmaxf(distance, radius);
-    /* the narrowest beam is concentrated this much on its axis */
-    const float axis = fmaxf(spread_share(light, 1), 1);
-    return luminance(radiance) * axis * area_of_lamp(light) * fmaxf(0, cosine) / (nearest * nearest);
+    if (!area_is_exact(light) || vec3_dot(to, to) > reach * reach)
+        return ball;
+    vec3 corners[4];
+    area_corners(light, corners);
+    return PL_PI * luminance(radiance) * (float)point_to_polygon(point, normal, corners, 4);
 }
 
 static bool sample_area(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out) {
@@ -245,19 +230,14 @@ static void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 po
     }
 }
 
-static float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 normal) {
+static float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float ball) {
     const mesh_light light = mesh_of(p);
     const vec3 to = vec3_sub(light.centre, point);
-    const float distance = vec3_length(to);
-    /* from far away the closed form says no more than the square law, and costs fifty times as much */
-    if (light.count <= EXACT_TRIANGLES && distance < 4 * light.radius) {
-        float rgb[3];
-        mesh_exact(lights, &light, point, normal, rgb);
-        return luminance(rgb);
-    }
-    const float cosine = best_cosine(to, distance, light.radius, normal);
-    const float nearest = fmaxf(distance, light.radius);
-    return light.weight * fmaxf(0, cosine) / (nearest * nearest);
+    if (light.count > EXACT_TRIANGLES || vec3_dot(to, to) > 16 * light.radius * light.radius)
+        return ball;
+    float rgb[3];
+    mesh_exact(lights, &light, point, normal, rgb);
+    return luminance(rgb);
 }
 
 /* The triangle whose share of the cumulative sums x falls into; x becomes its place in that share. */
@@ -317,32 +297,116 @@ bool light_is_sharp(const pl_lights *lights, size_t light) {
     return (lights->kinds[light] == PL_LIGHT_POINT || lights->kinds[light] == PL_LIGHT_SUN) && p[6] <= 0;
 }
 
-float light_importance(const pl_lights *lights, size_t light, vec3 point, vec3 normal) {
+static void describe_ball(const pl_lights *lights, size_t light, pl_light_balls *io_balls) {
     const float *p = parameters_of(lights, light);
+    io_balls->x[light] = p[0];
+    io_balls->y[light] = p[1];
+    io_balls->z[light] = p[2];
+    io_balls->radius[light] = 0;
     switch (lights->kinds[light]) {
-    case PL_LIGHT_POINT: {
-        const point_light lamp = point_of(p);
-        return point_importance(&lamp, p + 3, point, normal);
-    }
+    case PL_LIGHT_POINT:
+        io_balls->radius[light] = p[6];
+        io_balls->strength[light] = luminance(p + 3);
+        break;
     case PL_LIGHT_AREA: {
         const area_light lamp = area_of(p);
-        return area_importance(&lamp, p + 3, point, normal);
+        io_balls->radius[light] = vec3_length(vec3_add(lamp.axis_u, lamp.axis_v));
+        /* a narrow beam is concentrated on its axis */
+        io_balls->strength[light] =
+            luminance(p + 3) * area_of_lamp(&lamp) * fmaxf(spread_share(&lamp, 1), 1);
+        break;
     }
+    case PL_LIGHT_MESH:
+        io_balls->radius[light] = p[3];
+        io_balls->strength[light] = p[4];
+        break;
+    default:
+        io_balls->strength[light] = 0;
+    }
+    const bool is_plain = lights->kinds[light] == PL_LIGHT_POINT && p[12] < -1;
+    if (!is_plain)
+        io_balls->special[io_balls->special_count++] = light;
+}
+
+bool light_balls_create(const pl_lights *lights, pl_light_balls *out_balls) {
+    const size_t count = lights->count, room = count + 1;
+    float *columns = malloc(5 * sizeof(float) * room);
+    size_t *special = malloc(sizeof(size_t) * room);
+    *out_balls = (pl_light_balls){.count = count, .x = columns, .special = special};
+    if (!columns || !special) {
+        light_balls_destroy(out_balls);
+        return false;
+    }
+    out_balls->y = columns + room;
+    out_balls->z = columns + 2 * room;
+    out_balls->radius = columns + 3 * room;
+    out_balls->strength = columns + 4 * room;
+    for (size_t light = 0; light < count; ++light)
+        describe_ball(lights, light, out_balls);
+    return true;
+}
+
+void light_balls_destroy(pl_light_balls *balls) {
+    free(balls->x);
+    free(balls->special);
+}
+
+/* Strength by the square law, with the best cosine that any part of the ball can have. */
+static void ball_importances(const pl_light_balls *balls, vec3 point, vec3 normal, float *restrict out) {
+    const float *restrict xs = balls->x, *restrict ys = balls->y, *restrict zs = balls->z;
+    const float *restrict radii = balls->radius, *restrict strengths = balls->strength;
+    for (size_t i = 0; i < balls->count; ++i) {
+        const float x = xs[i] - point.x, y = ys[i] - point.y, z = zs[i] - point.z;
+        const float square = x * x + y * y + z * z + 1e-30f;
+        const float distance = sqrtf(square);
+        const float height = x * normal.x + y * normal.y + z * normal.z + radii[i];
+        const float best = height < distance ? height : distance;
+        const float nearest = square > radii[i] * radii[i] ? square : radii[i] * radii[i];
+        out[i] = best > 0 ? strengths[i] * best / (distance * nearest) : 0;
+    }
+}
+
+static float special_importance(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float ball) {
+    const float *p = parameters_of(lights, light);
+    switch (lights->kinds[light]) {
     case PL_LIGHT_SUN:
         return sun_importance(p, normal);
-    default:
-        return mesh_importance(lights, p, point, normal);
+    case PL_LIGHT_AREA: {
+        const area_light lamp = area_of(p);
+        return ball > 0 ? area_importance(&lamp, p + 3, point, normal, ball) : 0;
     }
+    case PL_LIGHT_MESH:
+        return ball > 0 ? mesh_importance(lights, p, point, normal, ball) : 0;
+    default: {
+        const point_light lamp = point_of(p);
+        return ball > 0 ? ball * cone_importance(&lamp, point) : 0;
+    }
+    }
+}
+
+float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal,
+                        float *out_importances) {
+    float total = 0;
+    ball_importances(balls, point, normal, out_importances);
+    for (size_t k = 0; k < balls->special_count; ++k) {
+        const size_t light = balls->special[k];
+        out_importances[light] = special_importance(lights, light, point, normal, out_importances[light]);
+    }
+    for (size_t light = 0; light < balls->count; ++light)
+        total += out_importances[light];
+    return total;
 }
 
 bool light_exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]) {
     const float *p = parameters_of(lights, light);
     if (lights->kinds[light] == PL_LIGHT_AREA) {
         const area_light lamp = area_of(p);
-        const float grey = luminance(p + 3);
-        if (!area_is_exact(&lamp) || grey <= 0)
+        if (!area_is_exact(&lamp))
             return false;
-        scaled(p + 3, area_importance(&lamp, p + 3, point, normal) / grey, out_rgb);
+        vec3 corners[4];
+        area_corners(&lamp, corners);
+        const bool faces = area_faces(&lamp, point);
+        scaled(p + 3, faces ? PL_PI * (float)point_to_polygon(point, normal, corners, 4) : 0, out_rgb);
         return true;
     }
     if (lights->kinds[light] == PL_LIGHT_MESH) {

@@ -21,12 +21,27 @@ static inline float luminance(const float rgb[3]) {
 bool light_is_sharp(const pl_lights *lights, size_t light);
 
 /*
- * What a light gives unoccluded, as luminance of irradiance: exact where a closed form is at hand, else a
- * guess that is above 0 wherever a sample can be.
+ * The lights as balls, in columns: a loop over them is what every receiver pays for every light, so it is
+ * the one loop here that must vectorise.
  */
-float light_importance(const pl_lights *lights, size_t light, vec3 point, vec3 normal);
+typedef struct pl_light_balls {
+    size_t count;
+    float *x, *y, *z, *radius, *strength;
+    size_t *special; /* lights that a ball does not describe: cones, one-sided lamps, suns, near meshes */
+    size_t special_count;
+} pl_light_balls;
 
-/* The same in three channels where it is exact; false where it is only a guess. */
+bool light_balls_create(const pl_lights *lights, pl_light_balls *out_balls);
+void light_balls_destroy(pl_light_balls *balls);
+
+/*
+ * What each light gives unoccluded, as luminance of irradiance: exact where it is near and has a closed form,
+ * else a guess that is above 0 wherever a sample can be. Returns their sum.
+ */
+float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal,
+                        float *out_importances);
+
+/* What a light gives unoccluded, in closed form; false where it has none. */
 bool light_exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]);
 
 /* A point of the light for (x, y) of the unit square; false where it cannot light the receiver. */
