@@ -48,8 +48,8 @@ kernel: $(VENV)/.installed $(KERNEL)
 # ---- the two commands ----
 
 DEMOS := room cornell
-# half a minute of work rather than the best there is; BAKE_OPTIONS= on the command line bakes with the defaults
-BAKE_OPTIONS := --texels 262144 --error 0.05
+# minutes on any machine rather than the best there is; BAKE_OPTIONS= on the command line bakes with the defaults
+BAKE_OPTIONS := --texels 262144 --error 0.05 --time-limit 90
 
 bake: kernel
 	$(BIN)/patchlight demo $(OUT)
