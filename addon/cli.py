@@ -25,6 +25,7 @@ NO_BLENDER = (
 )
 EXIT_ERROR, EXIT_CANCELLED = 1, 130
 DEFAULTS = BakeSettings()
+PICTURE_PIXELS = 960  # on the longer side
 
 
 class CommandError(Exception):
@@ -180,7 +181,9 @@ def run_picture(args: argparse.Namespace) -> None:
             if path:
                 files.require_writable(path)
         files.open_blend(args.input)
-        picture.render(args.output)
+        render = bpy.context.scene.render
+        scale = PICTURE_PIXELS / max(render.resolution_x, render.resolution_y)
+        picture.render(args.output, round(scale * render.resolution_x), round(scale * render.resolution_y))
         if args.lightmap:
             image = _lightmap(bpy.context.scene.objects)
             if image is None:

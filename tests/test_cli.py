@@ -223,6 +223,25 @@ def test_a_bake_that_fails_after_opening_keeps_an_older_result(room_blend, capsy
     assert older.read_bytes() == b"older"
 
 
+def test_a_picture_has_the_shape_of_the_scene(room_blend, capfd):
+    import bpy
+
+    folder = room_blend.parent
+    assert cli.main(["bake", str(room_blend), *QUICK]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "room_baked.blend"))
+    scene = bpy.context.scene
+    scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.render.resolution_x, scene.render.resolution_y = 50, 100
+    bpy.ops.wm.save_mainfile()
+    words = ["picture", folder / "room_baked.blend", folder / "p.png", "--lightmap", folder / "l.png"]
+    assert cli.main([str(word) for word in words]) == 0
+    picture = bpy.data.images.load(str(folder / "p.png"))
+    assert tuple(picture.size) == (480, 960)
+    assert max(list(picture.pixels)[::4]) > 0, "the room is lit"
+    assert (folder / "l.png").exists()
+
+
 # ---- progress ----
 
 
