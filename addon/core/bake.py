@@ -15,6 +15,7 @@ from .receivers import surface_receivers, vertex_receivers
 from .report import Report
 from .scene import Scene, SceneError, radiance_from_exitance
 from .settings import BakeSettings
+from .smoothing import texel_grid
 from .texels import texels
 from .unwrap import unwrap
 from .workers import OnProgress, Progress, Workers
@@ -54,9 +55,11 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
             progress.begin("texels")
             texel_map = texels(scene, charts)
             receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
+            grid = texel_grid(texel_map, receivers)
         else:
             progress.begin("texels")
             receivers, corner_means = vertex_receivers(scene, settings.smooth_angle_deg)
+            grid = None
 
         progress.begin("solve")
         kernel = KernelScene(scene, workers)
@@ -65,7 +68,7 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
 
         progress.begin("gather")
         irradiance = gather_irradiance(
-            kernel, emitters, solved.patches, receivers, settings.error, settings.seed,
+            kernel, solved.emitters, solved.patches, receivers, grid, settings.error, settings.seed,
             lambda: settings.time_limit is not None and progress.elapsed > settings.time_limit, progress.step,
         )  # fmt: skip
 

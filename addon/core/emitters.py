@@ -13,7 +13,7 @@ POINT, AREA, SUN, MESH = 0, 1, 2, 3
 LIGHT_FLOATS = 20
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
-MOST_GROUPS = 96  # groups of glowing triangles, about: each receiver weighs every group
+MOST_GROUPS = 96  # groups of glowing triangles: each receiver weighs every group
 GROUP_TRIANGLES = 8  # a group of no more has a closed form in the kernel
 TEXTURE_CUTS = 8  # a triangle whose glow is an image is cut into so many squared
 
@@ -25,7 +25,7 @@ class Emitters:
     kinds: np.ndarray  # int32 (L,)
     parameters: np.ndarray  # float32 (L, LIGHT_FLOATS)
     corners: np.ndarray  # float32 (N, 9) of glowing triangles
-    radiances: np.ndarray  # float32 (N, 3)
+    radiances: np.ndarray  # float32 (N, 6) of front and back
     cumulative: np.ndarray  # float32 (N,) chance of the group's triangles before each
 
     def __len__(self) -> int:
@@ -38,28 +38,39 @@ class Emitters:
 
 def emitters_of(scene: Scene, centre) -> Emitters:
     """The scene's lights and glowing triangles; ``centre`` is what the kernel re-centred by [m]."""
-    kinds, rows = [], []
-    for light in scene.lights:
-        kind, row = _light_row(light, np.asarray(centre))
-        kinds.append(kind)
-        rows.append(row)
+    table = [_light_row(light, np.asarray(centre)) for light in scene.lights]
+    lamps = Emitters(
+        kinds=np.array([kind for kind, _ in table], np.int32),
+        parameters=_padded([row for _, row in table]),
+        corners=np.zeros((0, 9), np.float32),
+        radiances=np.zeros((0, 6), np.float32),
+        cumulative=np.zeros(0, np.float32),
+    )
     corners, radiances = _glowing_triangles(scene)
+    return with_sources(lamps, corners, np.concatenate([radiances, radiances], axis=1), centre)
+
+
+def with_sources(emitters: Emitters, corners, radiances, centre) -> Emitters:
+    """The emitters and further glowing triangles: world corners (N, 3, 3) [m], radiance of front and back (N, 6)."""
     corners = corners - np.asarray(centre)
     order, groups = _groups(corners, radiances)
     corners, radiances = corners[order], radiances[order]
-    cumulative = np.zeros(len(corners))
+    cumulative, rows = np.zeros(len(corners)), []
     for first, count in groups:
         span = slice(first, first + count)
-        row, cumulative[span] = _group_row(corners[span], radiances[span], first)
-        kinds.append(MESH)
+        row, cumulative[span] = _group_row(corners[span], radiances[span], len(emitters.corners) + first)
         rows.append(row)
     return Emitters(
-        kinds=np.array(kinds, np.int32),
-        parameters=np.array([row + [0.0] * (LIGHT_FLOATS - len(row)) for row in rows], np.float32).reshape(-1, 20),
-        corners=corners.reshape(-1, 9).astype(np.float32),
-        radiances=radiances.astype(np.float32),
-        cumulative=cumulative.astype(np.float32),
+        kinds=np.concatenate([emitters.kinds, np.full(len(rows), MESH, np.int32)]),
+        parameters=np.concatenate([emitters.parameters, _padded(rows)]),
+        corners=np.concatenate([emitters.corners, corners.reshape(-1, 9).astype(np.float32)]),
+        radiances=np.concatenate([emitters.radiances, radiances.astype(np.float32)]),
+        cumulative=np.concatenate([emitters.cumulative, cumulative.astype(np.float32)]),
     )
+
+
+def _padded(rows):
+    return np.array([[*row, *[0.0] * (LIGHT_FLOATS - len(row))] for row in rows], np.float32).reshape(-1, LIGHT_FLOATS)
 
 
 def _light_row(light, centre):
@@ -129,8 +140,10 @@ def _groups(corners, radiances):
 
 
 def _flux(corners, radiances):
+    """What a triangle's brighter side sends out, for choosing (N,)."""
     areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return areas * (radiances @ LUMINANCE + 1e-6 * radiances.max(axis=1, initial=0.0))
+    sides = radiances.reshape(-1, 2, 3)
+    return areas * (sides @ LUMINANCE + 1e-6 * sides.max(axis=2, initial=0.0)).max(axis=1, initial=0.0)
 
 
 def _group_row(corners, radiances, first):

@@ -10,6 +10,7 @@ from .emitters import LUMINANCE, Emitters
 from .kernel import KernelScene
 from .radiosity import PatchSolution
 from .receivers import Receivers
+from .smoothing import TexelGrid, smoothed
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
 FIRST_RAYS = 8  # a replicate's rays in the first pass; every further pass doubles what there is
@@ -25,14 +26,12 @@ class Irradiance:
     Attributes
     ----------
     values : float32 (N, 3) E [W/m^2]
-    variance : float64 (N,) of the luminance of E, estimated
-    relative_error : RMS over receivers of the standard error over (E + 0.3 median E), luminance
+    relative_error : estimated RMS over receivers of the error over (E + 0.3 median E), luminance
     target_reached : whether sampling met its target before the time limit
     rays : {"direct": shadow rays, "gather": rays}
     """
 
     values: np.ndarray
-    variance: np.ndarray
     relative_error: float
     target_reached: bool
     rays: dict[str, int]
@@ -48,6 +47,7 @@ def gather_irradiance(
     emitters: Emitters,
     solution: PatchSolution,
     receivers: Receivers,
+    grid: TexelGrid | None,
     error: float,
     seed: int,
     is_late,
@@ -58,6 +58,7 @@ def gather_irradiance(
     Parameters
     ----------
     solution : the patches' reflected light; emission is left out of it, as emitters are sampled directly
+    grid : the texels that the receivers are, over which gathered light is smoothed; None = no smoothing
     error : target of the relative error of every receiver [1]
     is_late : () -> bool, whether the time limit has passed; the first pass is always finished
     on_step : (0..1) -> None
@@ -69,7 +70,7 @@ def gather_irradiance(
     counts = np.zeros(len(receivers), np.int64)
     active = np.arange(len(receivers), dtype=np.uint32)
     reached, done, take, rays = True, 0, FIRST_RAYS, 0
-    total, variance, relative = direct, direct_variance, np.zeros(len(receivers))
+    estimate = _Estimate(direct, direct_variance, np.zeros(len(receivers)), np.zeros(len(receivers)))
     while len(active):
         share, width = 0.3 + 0.7 * done / MOST_RAYS, 0.7 * take / MOST_RAYS
         rays += kernel.gather(
@@ -78,27 +79,47 @@ def gather_irradiance(
         )  # fmt: skip
         counts[active] += take
         done, take = done + take, done + take
-        total, variance, relative, sampled = _estimate(sums, counts, direct, direct_variance)
-        active = active[sampled[active] > error] if done < MOST_RAYS else active[:0]
+        estimate = _estimate(kernel.workers, grid, receivers, sums, counts, direct, direct_variance)
+        active = active[estimate.noise[active] > error] if done < MOST_RAYS else active[:0]
         if len(active) and is_late():
             reached = False
             break
-    rms = float(np.sqrt(np.mean(relative**2))) if len(relative) else 0.0
-    return Irradiance(total, variance, rms, reached and rms <= error, {"direct": int(shadow_rays), "gather": int(rays)})
+    rms = float(np.sqrt(max(estimate.squared_errors.mean(), 0.0))) if len(receivers) else 0.0
+    traced = {"direct": int(shadow_rays), "gather": int(rays)}
+    return Irradiance(estimate.values, rms, reached and rms <= error, traced)
 
 
-def _estimate(sums, counts, direct, direct_variance):
-    """Irradiance, variance of its luminance, and relative standard errors, per receiver.
+@dataclass(frozen=True, slots=True)
+class _Estimate:
+    """Irradiance so far.
 
-    The last two: of all sampling, and of the gathered light alone, pooled over neighbours, which says whether more rays
-    are due.
+    ``noise``: relative standard error of the gathered light, which says whether more rays are due; ``squared_errors``: of
+    the whole, relative, bias of smoothing included, meaningful as a mean only.
     """
+
+    values: np.ndarray
+    variance: np.ndarray
+    noise: np.ndarray
+    squared_errors: np.ndarray
+
+
+def _estimate(workers, grid, receivers, sums, counts, direct, direct_variance):
     means = sums / np.maximum(counts, 1)[:, None, None]
-    total = direct + means.mean(axis=1)
-    gathered = (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES
+    if grid is None:
+        gathered = means.mean(axis=1)
+        variance = (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES
+        squared_errors = variance
+        noise = np.convolve(variance, np.full(POOL, 1 / POOL), "same") if len(variance) >= POOL else variance
+    else:
+        smooth = smoothed(workers, grid, receivers, means)
+        gathered, variance, squared_errors, noise = smooth.values, smooth.variances, smooth.squared_errors, smooth.variances
+    total = direct + gathered
     luminance = total @ LUMINANCE
     lit = luminance[luminance > 1e-4 * max(luminance.mean(), 1e-30)]
     scale = luminance + DARK * (np.median(lit) if len(lit) else 1.0)
-    pooled = np.convolve(gathered, np.full(POOL, 1 / POOL), "same") if len(gathered) >= POOL else gathered
-    variance = gathered + direct_variance
-    return total.astype(np.float32), variance, np.sqrt(variance) / scale, np.sqrt(pooled) / scale
+    return _Estimate(
+        values=total.astype(np.float32),
+        variance=variance + direct_variance,
+        noise=np.sqrt(noise) / scale,
+        squared_errors=(squared_errors + direct_variance) / scale**2,
+    )

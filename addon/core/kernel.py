@@ -148,6 +148,24 @@ class KernelScene:
         return irradiance, variance, sum(self.workers.each_range(len(receivers), 2048, call, on_step))
 
 
+def smooth(workers, grid, receivers, values, variances, step, stops_on_value):
+    """One level of edge-stopping smoothing: values float32 (N, 4), variances float32 (N,) of their luminance.
+
+    ``grid`` is a smoothing.TexelGrid; what the arguments mean: native/include/patchlight.h, pl_smooth.
+    """
+    out_values, out_variances = np.zeros_like(values), np.zeros_like(variances)
+    where, (height, width) = receivers.arrays(), grid.receivers.shape
+
+    def call(start, stop):
+        _kernel.smooth(
+            grid.receivers, width, height, grid.spacing, where, values, variances, step, int(stops_on_value), start,
+            stop - start, out_values, out_variances,
+        )  # fmt: skip
+
+    workers.each_range(height, 16, call)
+    return out_values, out_variances
+
+
 def rasterise_texels(uvs, width, height):
     """Receivers among the texels: triangles int32, distances float32 [texels], (height, width); barycentrics float32.
 

@@ -28,12 +28,17 @@ class Patches:
     areas : float64 (P,) [m^2]
     triangles : int32 (P,) which triangle each is part of
     reflectance : float32 (P, 3) rho, the mean over the patch; 0 where the material transmits
+    bounds : float32 (P, 4) where each lies on its triangle: distance from the apex at its wide and its narrow end, and
+        from the next corner to the one after at its first and its second side, all as shares
+    apexes : uint8 (T,)
     """
 
     size: float
     areas: np.ndarray
     triangles: np.ndarray
     reflectance: np.ndarray
+    bounds: np.ndarray
+    apexes: np.ndarray
 
     def __len__(self) -> int:
         return len(self.areas)
@@ -87,12 +92,33 @@ def subdivide(scene: Scene, kernel: KernelScene, size: float, budget: int, seed:
     shares = ((1 - row / height) ** 2 - (1 - (row + 1) / height) ** 2) / columns
     row_areas = areas[row_triangle] * shares
     triangles = np.repeat(row_triangle, columns).astype(np.int32)
+    column = np.arange(first_patches[-1]) - np.repeat(first_patches[:-1], columns)
+    across = np.repeat(columns, columns)
+    ends = np.stack([1 - row / height, 1 - (row + 1) / height], axis=1)
+    bounds = np.concatenate([np.repeat(ends, columns, axis=0), np.stack([column, column + 1], 1) / across[:, None]], 1)
     return Patches(
         size=size,
         areas=np.repeat(row_areas, columns),
         triangles=triangles,
         reflectance=_mean_reflectance(scene, kernel, triangles, seed),
+        bounds=bounds.astype(np.float32),
+        apexes=apexes,
     )
+
+
+def patch_triangles(scene: Scene, patches: Patches, chosen):
+    """Corners of two triangles that make up each chosen patch (K,), wound as the triangle it is of: float64 (K, 2, 3, 3) [m]."""
+    triangles = patches.triangles[chosen]
+    corners, apexes = scene.corners[triangles], patches.apexes[triangles].astype(int)
+    rows = np.arange(len(triangles))
+    apex, left, right = (corners[rows, (apexes + k) % 3] for k in range(3))
+    wide, narrow, first, second = patches.bounds[chosen].astype(np.float64).T[:, :, None]
+
+    def point(width, across):
+        return (1 - width) * apex + width * ((1 - across) * left + across * right)
+
+    a, b, c, d = point(wide, first), point(wide, second), point(narrow, second), point(narrow, first)
+    return np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1)
 
 
 def _apexes(scene):

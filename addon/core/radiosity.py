@@ -6,15 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .emitters import Emitters
+from .emitters import LUMINANCE, Emitters, with_sources
 from .kernel import KernelScene
-from .patches import Patches, patch_size_for, subdivide
+from .patches import Patches, patch_size_for, patch_triangles, subdivide
 from .receivers import patch_receivers
-from .scene import Scene, exitance_from_radiance
+from .scene import Scene, exitance_from_radiance, radiance_from_exitance
 from .settings import BakeSettings
 from .solver import Solution, require_direct_size, solve_direct, solve_progressive, solve_stochastic
 from .transport import form_factors
 
+EVEN, MIXED_SIDE, LIGHT = 0, 1, 2  # kinds of sides, as the kernel has them
 # patches, about, that each solver is given; triangles are never joined, so there may be more
 PATCH_BUDGETS = {"direct": 1200, "progressive": 3000, "stochastic": 30000}
 DIRECT_TRIANGLES, PROGRESSIVE_TRIANGLES = 150, 1500  # up to which "auto" takes them
@@ -24,6 +25,7 @@ PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 
 PATCH_SKY_RAYS = 4  # of each point
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 MIXED = 0.25  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
+BRIGHT = 5.0  # times the median radiosity: brighter sides are sampled as lights, so that few rays find much light
 REACH = 2.0  # patch sizes: nearer hits go on from the point hit
 
 
@@ -36,7 +38,7 @@ class PatchSolution:
     radiosity : float32 (2 P, 3) reflected radiosity of the sides, emission left out [W/m^2]
     direct : float32 (2 P, 3) the part of it that is the lights' direct light reflected once [W/m^2]
     reflectance : float32 (P, 3)
-    is_mixed : uint8 (2 P,) 1 where the lights reach one part of a side and not another
+    kinds : uint8 (2 P,) EVEN, MIXED (lights reach one part of the side only) or LIGHT (receivers sample it as a light)
     reaches : float32 (P,) rays that hit from nearer do not take the patch's mean [m]
     sky : float32 (1, 3) pi times the world's radiance [W/m^2]
     """
@@ -44,13 +46,13 @@ class PatchSolution:
     radiosity: np.ndarray
     direct: np.ndarray
     reflectance: np.ndarray
-    is_mixed: np.ndarray
+    kinds: np.ndarray
     reaches: np.ndarray
     sky: np.ndarray
 
     def arrays(self) -> tuple:
         """In the kernel's order."""
-        return self.radiosity, self.direct, self.reflectance, self.is_mixed, self.reaches, self.sky
+        return self.radiosity, self.direct, self.reflectance, self.kinds, self.reaches, self.sky
 
     def __len__(self) -> int:
         return len(self.reaches)
@@ -63,12 +65,14 @@ class Solved:
     Attributes
     ----------
     patches : PatchSolution
+    emitters : the scene's, and the sides that are so bright that receivers sample them as lights
     solution : the solver's own result
     method, choice : what was picked, and why
     rays : {"patches": ..., "solve": ...}
     """
 
     patches: PatchSolution
+    emitters: Emitters
     solution: Solution
     method: str
     choice: str
@@ -91,17 +95,43 @@ def solve_radiosity(
     emitted = patches.side_reflectance * (direct + daylight)
     solution = _solve(kernel, patches, emitted, solver, method, settings, lambda done: on_step(0.5 + 0.5 * done))
 
-    typical = np.average(solution.radiosity.mean(axis=1), weights=patches.side_areas + 1e-300)
-    is_mixed = spread * patches.side_reflectance.mean(axis=1) > MIXED * (solution.radiosity.mean(axis=1) + typical)
+    kinds, bright = _side_kinds(patches, solution.radiosity, spread)
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),
         direct=(patches.side_reflectance * direct).astype(np.float32),
         reflectance=np.ascontiguousarray(patches.reflectance, np.float32),
-        is_mixed=is_mixed.astype(np.uint8),
+        kinds=kinds,
         reaches=(REACH * np.sqrt(patches.areas)).astype(np.float32),
         sky=sky,
     )
-    return Solved(field, solution, method, choice, {"patches": traced + sky_rays, "solve": solution.rays})
+    sources = _as_sources(scene, kernel, patches, emitters, solution.radiosity, bright)
+    return Solved(field, sources, solution, method, choice, {"patches": traced + sky_rays, "solve": solution.rays})
+
+
+def _side_kinds(patches, radiosity, spread):
+    """The kind of each side, uint8 (2 P,), and which sides are LIGHT."""
+    luminance = radiosity @ LUMINANCE
+    lit = np.flatnonzero((luminance > 0) & (patches.side_areas > 0))
+    typical = _weighted_median(luminance[lit], patches.side_areas[lit]) if len(lit) else 0.0
+    is_mixed = spread * patches.side_reflectance.mean(axis=1) > MIXED * (luminance + typical)
+    is_bright = (luminance > BRIGHT * typical) & ~is_mixed & (patches.side_areas > 0)
+    return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
+
+
+def _weighted_median(values, weights):
+    order = np.argsort(values, kind="stable")
+    reached = np.cumsum(weights[order])
+    return float(values[order[np.searchsorted(reached, 0.5 * reached[-1])]])
+
+
+def _as_sources(scene, kernel, patches, emitters, radiosity, bright):
+    """The emitters with the bright sides among them, each glowing on its own side only."""
+    corners = patch_triangles(scene, patches, bright // 2)
+    radiances = np.zeros((len(bright), 2, 3))
+    radiances[np.arange(len(bright)), bright % 2] = radiance_from_exitance(radiosity[bright])
+    corners = corners.reshape(-1, 3, 3)
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return with_sources(emitters, corners[areas > 0], np.repeat(radiances.reshape(-1, 6), 2, axis=0)[areas > 0], kernel.centre)
 
 
 def _solve(kernel, patches, emitted, solver, method, settings, on_step) -> Solution:
@@ -161,7 +191,7 @@ def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):
         radiosity=np.zeros((kernel.side_count, 3), np.float32),
         direct=np.zeros((kernel.side_count, 3), np.float32),
         reflectance=np.zeros((len(patches), 3), np.float32),
-        is_mixed=np.zeros(kernel.side_count, np.uint8),
+        kinds=np.full(kernel.side_count, EVEN, np.uint8),
         reaches=np.zeros(len(patches), np.float32),
         sky=sky,
     )

@@ -166,7 +166,7 @@ typedef struct pl_receivers {
  *   SUN    direction to the sun, irradiance, angular radius
  *   MESH   centre, bounding radius, flux-like weight (sum of area * radiance) for choosing; first and
  *          count of its emitting triangles
- * Emitting triangles: corners (9 floats), radiance (3), scene triangle; a MESH light's triangles are
+ * Emitting triangles: corners (9 floats), radiance of front and back (6); a MESH light's triangles are
  * chosen with the chances whose cumulative sums, from 0 to 1, are `cumulative`.
  * Positions are relative to `centre`, which the scene was re-centred by: pl_scene_centre.
  */
@@ -189,17 +189,21 @@ void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
  *   radiosity    3 * 2 * patch_count: reflected radiosity, emission left out
  *   direct       3 * 2 * patch_count: the part of it that is the lights' direct light reflected once
  *   reflectance  3 * patch_count
- *   is_mixed     2 * patch_count: 1 where the lights reach one part of a side and not another: there a ray
- *                samples the lights anew at the very point that it hits
+ *   kinds        2 * patch_count, a pl_side_kind each
  *   reaches      patch_count: a ray that hits a patch from nearer than this [m] does not take the patch's
  *                mean but goes on from the point hit, as the patch may lie half under something
  *   sky          pi * the radiance of what rays see that leave the scene
  */
+typedef enum pl_side_kind {
+    PL_SIDE_EVEN = 0,  /* one radiosity stands for it */
+    PL_SIDE_MIXED = 1, /* lights reach one part of it only: rays sample the lights anew where they hit it */
+    PL_SIDE_LIGHT = 2  /* so bright that receivers sample it as a light: their own rays must not count it */
+} pl_side_kind;
 typedef struct pl_solution {
     const float *radiosity;
     const float *direct;
     const float *reflectance;
-    const uint8_t *is_mixed;
+    const uint8_t *kinds;
     const float *reaches;
     float sky[3];
 } pl_solution;
@@ -274,5 +278,26 @@ pl_status pl_rasterise_texels(const float *uvs, size_t triangle_count, int32_t w
 pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t *first_triangles,
                          size_t chart_count, double density, int32_t width, int32_t block, int32_t *out_places,
                          int32_t *out_height);
+
+/*
+ * One level of edge-stopping smoothing over a lightmap's receivers.
+ *
+ *   grid            which receiver each texel is, row-major, -1 for none; spacing of texels [m], about
+ *   receivers       positions and shading normals: no smoothing across creases, steps, or charts
+ *   values          4 per receiver: three channels whose luminance decides, and one that goes along
+ *   variances       1 per receiver, of that luminance
+ *   step            texels between the 5 x 5 taps: 1, 2, 4 ... for successive levels
+ *   stops_on_value  0: geometry alone decides
+ *   first_row, row_count  the range
+ *   out_values, out_variances  at the receivers' indices; the variance of the weighted mean
+ */
+typedef struct pl_texel_grid {
+    const int32_t *receivers;
+    int32_t width, height;
+    float spacing;
+} pl_texel_grid;
+void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
+               const float *variances, int32_t step, int32_t stops_on_value, int32_t first_row,
+               int32_t row_count, float *out_values, float *out_variances);
 
 #endif

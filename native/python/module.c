@@ -228,7 +228,7 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
 /* The five arrays of a light table, as every function that samples lights takes them. */
 #define LIGHT_ARRAYS                                                                                        \
     {"light_kinds", 'i', 1, -1, false, {0}}, {"light_parameters", 'f', PL_LIGHT_FLOATS, -1, false, {0}},    \
-        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 3, -1, false, {0}},             \
+        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 6, -1, false, {0}},             \
         {"light_cumulative", 'f', 1, -1, false, {0}}
 enum { LIGHT_ARRAY_COUNT = 5, RECEIVER_ARRAY_COUNT = 3 };
 
@@ -273,7 +273,7 @@ static PyObject *gather(PyObject *self, PyObject *args) {
     door_array arrays[] = {{"radiosity", 'f', 3, -1, false, {0}},
                            {"direct", 'f', 3, -1, false, {0}},
                            {"reflectance", 'f', 3, -1, false, {0}},
-                           {"is_mixed", 'B', 1, -1, false, {0}},
+                           {"kinds", 'B', 1, -1, false, {0}},
                            {"reaches", 'f', 1, -1, false, {0}},
                            {"sky", 'f', 3, 1, false, {0}},
                            LIGHT_ARRAYS,
@@ -330,6 +330,37 @@ static PyObject *direct(PyObject *self, PyObject *args) {
 
     door_release(arrays, ARRAYS);
     return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
+}
+
+static PyObject *smooth(PyObject *self, PyObject *args) {
+    enum { VALUES = RECEIVER_ARRAY_COUNT + 1, VARIANCES, OUT_VALUES, OUT_VARIANCES, ARRAYS };
+    PyObject *receiver_arrays, *objects[ARRAYS];
+    pl_texel_grid grid;
+    int step, stops_on_value, first_row, row_count;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OiifOOOiiiiOO", &objects[RECEIVER_ARRAY_COUNT], &grid.width, &grid.height,
+                          &grid.spacing, &receiver_arrays, &objects[VALUES], &objects[VARIANCES], &step,
+                          &stops_on_value, &first_row, &row_count, &objects[OUT_VALUES],
+                          &objects[OUT_VARIANCES]))
+        return NULL;
+    door_array arrays[] = {RECEIVER_ARRAYS,
+                           {"grid", 'i', 1, (Py_ssize_t)grid.width * grid.height, false, {0}},
+                           {"values", 'f', 4, -1, false, {0}},
+                           {"variances", 'f', 1, -1, false, {0}},
+                           {"out_values", 'f', 4, -1, true, {0}},
+                           {"out_variances", 'f', 1, -1, true, {0}}};
+    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS))
+        return NULL;
+    const pl_receivers receivers = receivers_of(arrays);
+    grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value,
+              first_row, row_count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, ARRAYS);
+    Py_RETURN_NONE;
 }
 
 static PyObject *rasterise_texels(PyObject *self, PyObject *args) {
@@ -404,6 +435,9 @@ static PyMethodDef methods[] = {
      "gather(scene, patches, solution, lights, receivers, selected, replicates, first, count, seed, io_sums) -> rays"},
     {"direct", direct, METH_VARARGS,
      "direct(scene, lights, receivers, first, count, samples, seed, out_irradiance, out_variance) -> rays"},
+    {"smooth", smooth, METH_VARARGS,
+     "smooth(grid, width, height, spacing, receivers, values, variances, step, stops_on_value, first_row, "
+     "row_count, out_values, out_variances)"},
     {"rasterise_texels", rasterise_texels, METH_VARARGS,
      "rasterise_texels(uvs, width, height, out_triangles, out_distances, out_barycentrics)"},
     {"pack_charts", pack_charts, METH_VARARGS,

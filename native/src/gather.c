@@ -60,7 +60,7 @@ static vec3 hit_normal(const pl_scene *scene, const pl_hit *hit, size_t side) {
 static void reflect_direct(gather_job *job, const pl_hit *hit, size_t side, ray_random *random,
                            const float *weight, float *io_sum) {
     const pl_solution *solution = job->solution;
-    if (!solution->is_mixed[side]) {
+    if (solution->kinds[side] != PL_SIDE_MIXED) {
         add(io_sum, solution->direct + 3 * side, weight);
         return;
     }
@@ -92,8 +92,10 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         const size_t side = step == 0 && frame->is_smooth
                                 ? smooth_side(job->patches, frame, direction, &hit)
                                 : hit_side(job->patches, &hit);
+        if (step == 0 && solution->kinds[side] == PL_SIDE_LIGHT)
+            return;
         const bool is_far = hit.distance >= solution->reaches[side / 2];
-        if (is_far && !solution->is_mixed[side]) {
+        if (is_far && solution->kinds[side] != PL_SIDE_MIXED) {
             add(io_sum, solution->radiosity + 3 * side, weight);
             return;
         }

@@ -218,15 +218,27 @@ static bool sample_area(const float *p, vec3 point, vec3 normal, float x, float 
     return true;
 }
 
+/* Radiance of a glowing triangle towards the side that a point is on. */
+static const float *radiance_towards(const pl_lights *lights, size_t triangle, vec3 corner, vec3 twice_area,
+                                     vec3 point) {
+    const bool is_front = vec3_dot(vec3_sub(point, corner), twice_area) >= 0;
+    return lights->triangle_radiances + 6 * triangle + (is_front ? 0 : 3);
+}
+
 static void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 point, vec3 normal,
                        float out_rgb[3]) {
     out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
     for (size_t t = light->first; t < light->first + light->count; ++t) {
         const float *c = lights->triangle_corners + 9 * t;
         const vec3 corners[3] = {vec3_from(c), vec3_from(c + 3), vec3_from(c + 6)};
+        const vec3 twice_area =
+            vec3_cross(vec3_sub(corners[1], corners[0]), vec3_sub(corners[2], corners[0]));
+        const float *radiance = radiance_towards(lights, t, corners[0], twice_area, point);
+        if (luminance(radiance) <= 0)
+            continue;
         const float factor = PL_PI * (float)point_to_polygon(point, normal, corners, 3);
         for (int k = 0; k < 3; ++k)
-            out_rgb[k] += factor * lights->triangle_radiances[3 * t + (size_t)k];
+            out_rgb[k] += factor * radiance[k];
     }
 }
 
@@ -270,7 +282,7 @@ static bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec
     const float width = sqrtf(x);
     vec3 target = vec3_mul_add(ab, width * (1 - y), vec3_mul_add(ac, width * y, a));
 
-    /* both sides glow; the target is moved off the face towards the receiver, so that the face itself,
+    /* the target is moved off the face towards the receiver, so that the face itself,
        which is an occluder too, is not in the way */
     vec3 lamp_normal = vec3_unit(twice_area);
     if (vec3_dot(vec3_sub(point, target), lamp_normal) < 0)
@@ -287,9 +299,9 @@ static bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec
     if (cosine <= 0 || lamp_cosine <= 0)
         return false;
     const float area = 0.5f * vec3_length(twice_area);
-    scaled(lights->triangle_radiances + 3 * t, cosine * lamp_cosine * area / (square * chance),
-           out->irradiance);
-    return true;
+    const float *radiance = radiance_towards(lights, t, a, twice_area, point);
+    scaled(radiance, cosine * lamp_cosine * area / (square * chance), out->irradiance);
+    return luminance(radiance) > 0;
 }
 
 bool light_is_sharp(const pl_lights *lights, size_t light) {

@@ -1,0 +1,87 @@
+/*
+ * Smoothing gathered light over a lightmap's texels, no further than its noise and the geometry allow.
+ *
+ * One level of an a-trous wavelet filter with edge stops (Dammertz, Sewtz, Hanika & Lensch 2010), its stop on
+ * value driven by the estimated variance (Schied et al. 2017).
+ * SPDX-License-Identifier: GPL-3.0-or-later
+ */
+#include "lights.h"
+
+#include <math.h>
+
+enum { CHANNELS = 4, RADIUS = 2 };
+static const float spline[RADIUS + 1] = {0.375f, 0.25f, 0.0625f}; /* B3 spline, from the middle out */
+
+typedef struct smooth_job {
+    const pl_texel_grid *grid;
+    const pl_receivers *receivers;
+    const float *values, *variances;
+    int32_t step;
+    bool stops_on_value;
+} smooth_job;
+
+/* How far two receivers are samples of one smooth surface: 0 across creases, steps and charts. */
+static float geometric_weight(const smooth_job *job, size_t a, size_t b, float texels_apart) {
+    const double *p = job->receivers->positions + 3 * a, *q = job->receivers->positions + 3 * b;
+    const vec3 apart = {(float)(q[0] - p[0]), (float)(q[1] - p[1]), (float)(q[2] - p[2])};
+    const vec3 n = vec3_from(job->receivers->normals + 3 * a);
+    const float cosine = vec3_dot(n, vec3_from(job->receivers->normals + 3 * b));
+    const float reach = job->grid->spacing * texels_apart;
+    /* a neighbour in the atlas that is further away in space than its texels are belongs to another chart */
+    if (cosine < 0.9f || vec3_dot(apart, apart) > 4 * reach * reach)
+        return 0;
+    const float height = vec3_dot(apart, n) / reach;
+    const float square = cosine * cosine, fourth = square * square;
+    return fourth * fourth * expf(-8 * height * height);
+}
+
+/* How far two values are the same but for their noise. */
+static float value_weight(const smooth_job *job, size_t a, size_t b) {
+    const float difference =
+        luminance(job->values + CHANNELS * a) - luminance(job->values + CHANNELS * b);
+    const float noise = job->variances[a] + job->variances[b];
+    return noise > 0 ? expf(-difference * difference / (4 * noise)) : (difference == 0 ? 1.0f : 0.0f);
+}
+
+static void smooth_texel(const smooth_job *job, int32_t row, int32_t column, size_t receiver, float *out_values,
+                         float *out_variances) {
+    const pl_texel_grid *grid = job->grid;
+    float sums[CHANNELS] = {0}, weights = 0, variance = 0;
+    for (int32_t dy = -RADIUS; dy <= RADIUS; ++dy) {
+        for (int32_t dx = -RADIUS; dx <= RADIUS; ++dx) {
+            const int32_t y = row + dy * job->step, x = column + dx * job->step;
+            if (y < 0 || x < 0 || y >= grid->height || x >= grid->width)
+                continue;
+            const int32_t other = grid->receivers[(size_t)y * (size_t)grid->width + (size_t)x];
+            if (other < 0)
+                continue;
+            float weight = spline[dx < 0 ? -dx : dx] * spline[dy < 0 ? -dy : dy];
+            if (dx || dy) {
+                const float apart = sqrtf((float)(dx * dx + dy * dy)) * (float)job->step;
+                weight *= geometric_weight(job, receiver, (size_t)other, apart);
+                if (weight > 0 && job->stops_on_value)
+                    weight *= value_weight(job, receiver, (size_t)other);
+            }
+            for (int k = 0; k < CHANNELS; ++k)
+                sums[k] += weight * job->values[CHANNELS * (size_t)other + (size_t)k];
+            variance += weight * weight * job->variances[other];
+            weights += weight;
+        }
+    }
+    for (int k = 0; k < CHANNELS; ++k)
+        out_values[CHANNELS * receiver + (size_t)k] = sums[k] / weights;
+    out_variances[receiver] = variance / (weights * weights);
+}
+
+void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
+               const float *variances, int32_t step, int32_t stops_on_value, int32_t first_row,
+               int32_t row_count, float *out_values, float *out_variances) {
+    const smooth_job job = {grid, receivers, values, variances, step, stops_on_value != 0};
+    for (int32_t row = first_row; row < first_row + row_count; ++row) {
+        for (int32_t column = 0; column < grid->width; ++column) {
+            const int32_t receiver = grid->receivers[(size_t)row * (size_t)grid->width + (size_t)column];
+            if (receiver >= 0)
+                smooth_texel(&job, row, column, (size_t)receiver, out_values, out_variances);
+        }
+    }
+}
