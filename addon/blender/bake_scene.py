@@ -14,6 +14,7 @@ import numpy as np
 from ..core.scene import Scene, SceneError, SceneObject
 from ..core.settings import BakeSettings, SettingsError
 from .cut_mesh import cut_mesh
+from .place_mesh import have_no_area
 from .read_scene import read_scene
 from .write_lightmap import require_layer_room, write_lightmap
 from .write_vertex_colours import write_vertex_colours
@@ -74,12 +75,12 @@ def write(prepared: PreparedBake, result) -> None:
     """Store a BakeResult in the file: all of it, or nothing and a SceneError."""
     meshes = {target.name: _checked_mesh(prepared, target.name) for target in prepared.targets}
     if prepared.settings.target == "lightmap":
-        _require_finite("lightmap", result.lightmap.pixels)
+        _require_finite("the lightmap", result.lightmap.pixels)
+        _require_complete(prepared, result.lightmap.uvs, "lightmap UVs")
         for name, mesh in meshes.items():
             require_layer_room(name, mesh)
     else:
-        for target in prepared.targets:
-            _require_finite(f"the vertex colours of '{target.name}'", result.corner_colours[target.span])
+        _require_complete(prepared, result.corner_colours, "colours")
     for name in prepared.cut_meshes:
         _swap_mesh(bpy.data.objects[(name, None)], meshes[name])
     if prepared.settings.target == "lightmap":
@@ -145,7 +146,16 @@ def _checked_mesh(prepared, name):
 
 def _require_finite(what, values):
     if not np.isfinite(values).all():
-        raise SceneError(f"{what}: the bake has values that are not finite; nothing has been written")
+        raise SceneError(f"{what} of the bake has values that are not finite: nothing has been written")
+
+
+def _require_complete(prepared, values, what):
+    """Every triangle of a target has its values; one without area may lack them, nobody sees it."""
+    for target in prepared.targets:
+        is_missing = ~np.isfinite(values[target.span]).all(axis=(1, 2))
+        corners = prepared.scene.vertices[prepared.scene.triangles[target.span][is_missing]]
+        if not have_no_area(corners).all():
+            raise SceneError(f"the bake has no {what} for some faces of '{target.name}': nothing has been written")
 
 
 def _swap_mesh(blender_object, cut):

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+ROUNDING = 1e-6  # an edge of just the longest length is not cut
 KEY_STEP = np.int64(1) << 32  # above any vertex index: one integer names an edge
 
 
@@ -42,7 +43,7 @@ class Faces:
 
 def cut_faces(faces: Faces, longest: float) -> Faces:
     """Cut until no edge is longer than ``longest``."""
-    limit = longest * (1 + 1e-6)  # an edge of just that length is not cut by rounding
+    limit = longest * (1 + ROUNDING)
     while True:
         faces = _without_mixed_quads(faces, limit)
         edges = _Edges(faces, limit)

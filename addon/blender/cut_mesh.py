@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from ..core.scene import SceneError
-from .cut_faces import Faces, cut_faces, edge_keys
+from .cut_faces import ROUNDING, Faces, cut_faces, edge_keys
 from .read_mesh import are_finite, corner_vertices, read_positions
 from .rebuild_mesh import Origins, rebuild_mesh
 
@@ -27,7 +27,8 @@ def cut_mesh(blender_object, matrix: np.ndarray, longest: float) -> bpy.types.Me
     if not polygons.is_cut.any():
         return None
     quads, triangles = polygons.cut_quads(), polygons.cut_triangles()
-    _require_possible(positions[polygons.vertices[triangles]], longest, blender_object.name)
+    surface = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], triangles])
+    _require_possible(positions[polygons.vertices[surface]], longest, blender_object.name)
     sources = np.concatenate([quads, triangles[:, [0, 1, 2, 2]]])
     faces = cut_faces(_first_faces(mesh, positions, polygons.vertices, quads, triangles), longest)
     return rebuild_mesh(mesh, _origins(polygons, faces, sources))
@@ -42,16 +43,21 @@ class _Polygons:
         mesh.polygons.foreach_get("loop_start", self.starts)
         mesh.polygons.foreach_get("loop_total", self.sizes)
         self.of_corner = np.repeat(np.arange(len(self.sizes)), self.sizes)
-        order = np.argsort(self.starts)  # corners of a polygon are consecutive; polygons may be in any order
-        self.of_corner = order[np.repeat(np.arange(len(order)), self.sizes[order])]
-        corners = positions[self.vertices]
-        extents = [reduce.reduceat(corners, self.starts[order]) for reduce in (np.maximum, np.minimum)]
-        width = np.empty(len(order))
-        width[order] = np.linalg.norm(extents[0] - extents[1], axis=1)
-        # A polygon has a long edge, or may have an inner edge that is long, only when it is wide. Narrow ones stay.
-        self.is_cut = width > longest
+        self._corners = positions[self.vertices]
+        # A polygon of many short edges may still be wide: it has inner edges as soon as it is triangulated.
+        self.is_cut = self._longest_edges() > longest * (1 + ROUNDING)
+        self.is_cut |= (self.sizes > 4) & (self._widths() > longest)
         self._read_triangles(mesh)
-        self._corners = corners
+
+    def _longest_edges(self):
+        following = np.arange(1, len(self._corners) + 1)
+        following[self.starts + self.sizes - 1] = self.starts
+        lengths = np.linalg.norm(self._corners[following] - self._corners, axis=1)
+        return np.maximum.reduceat(lengths, self.starts)
+
+    def _widths(self):
+        extents = [reduce.reduceat(self._corners, self.starts) for reduce in (np.maximum, np.minimum)]
+        return np.linalg.norm(extents[0] - extents[1], axis=1)
 
     def _read_triangles(self, mesh):
         mesh.calc_loop_triangles()
@@ -68,8 +74,8 @@ class _Polygons:
         """Corners of the triangles of all other polygons to be cut, int64 (T, 3)."""
         return self._triangles[(self.is_cut & ~self._is_cut_quad())[self._of_triangle]]
 
-    def kept_corners(self):
-        """Corners of the polygons that stay, in order, and the sizes of those polygons."""
+    def kept(self):
+        """Corners of the polygons that stay, and those polygons."""
         return np.flatnonzero(~self.is_cut[self.of_corner]), np.flatnonzero(~self.is_cut)
 
     def _is_cut_quad(self):
@@ -105,12 +111,10 @@ def _first_faces(mesh, positions, vertices, quads, triangles):
 
 def _origins(polygons, faces: Faces, sources) -> Origins:
     """Where all of the cut mesh comes from; its polygons are the kept ones, the quads, the triangles."""
-    kept, kept_polygons = polygons.kept_corners()
+    kept, kept_polygons = polygons.kept()
     corners = np.concatenate([faces.quads.ravel(), faces.triangles.ravel()])
     first_corners = np.concatenate([faces.quads[:, 0], faces.triangles[:, 0]])
     own_weight = np.tile([1.0, 0.0, 0.0, 0.0], (len(kept), 1))
-    order = np.argsort(polygons.starts[kept_polygons])
-    kept_polygons = kept_polygons[order]
     sizes = [polygons.sizes[kept_polygons], np.full(len(faces.quads), 4), np.full(len(faces.triangles), 3)]
     return Origins(
         vertices=np.concatenate([polygons.vertices[kept], faces.vertices[corners]]),

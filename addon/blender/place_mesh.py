@@ -58,6 +58,11 @@ def place_mesh(mesh: MeshArrays, matrix: np.ndarray, materials: np.ndarray, uvs:
     )
 
 
+def have_no_area(corners) -> np.ndarray:
+    """Which triangles of corners (T, 3, 3) have no area to bake, bool (T,)."""
+    return _face_normals(corners)[1]
+
+
 def _face_normals(corners):
     """Unit geometric normals (T, 3), +z where there is none, and which triangles have no area."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]

@@ -35,7 +35,8 @@ def write_lightmap(targets, lightmap) -> None:
 def _write_uvs(mesh, corners, uvs):
     layer = mesh.uv_layers.get(LIGHTMAP_LAYER) or _new_layer(mesh)
     values = np.zeros((len(mesh.loops), 2), np.float32)
-    values[corners] = uvs
+    has_place = np.isfinite(uvs).all(axis=(1, 2))  # a triangle without area may have none
+    values[corners[has_place]] = uvs[has_place]
     layer.uv.foreach_set("vector", values.ravel())
     mesh.update()
 

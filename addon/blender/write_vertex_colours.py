@@ -14,7 +14,9 @@ def write_vertex_colours(targets, corner_colours) -> None:
         mesh = bpy.data.objects[(target.name, None)].data
         values = np.ones((len(mesh.loops), 4), np.float32)
         values[:, :3] = 0.0
-        values[target.corners, :3] = corner_colours[target.span]
+        colours = corner_colours[target.span]
+        is_lit = np.isfinite(colours).all(axis=(1, 2))  # a triangle without area may not be
+        values[target.corners[is_lit], :3] = colours[is_lit]
         attribute = _attribute(mesh)
         attribute.data.foreach_set("color", values.ravel())
         mesh.update()
