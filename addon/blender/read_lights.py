@@ -85,10 +85,10 @@ def _spot(lamp, name, matrix, power, warn):
 
 def _intensity(lamp, power):
     """I [W/sr]; what the cone of a spot cuts off is not given to the rest."""
-    radius = lamp.shadow_soft_size
-    if _is_normalised(lamp) or radius <= 0:
+    if _is_normalised(lamp):
         return power / (4 * pi)
-    return power * radius**2  # a sphere of L = P / pi
+    radius = lamp.shadow_soft_size
+    return power * radius**2 if radius > 0 else power / pi  # a sphere of L = P / pi; a point of I = P / pi
 
 
 def _sphere(lamp):

@@ -63,10 +63,12 @@ def test_exposure_and_temperature_multiply(add_lamp, read):
 
 
 def test_a_point_that_is_not_normalised_is_a_sphere_of_p_over_pi(add_lamp, read):
-    add_lamp("POINT", energy=8.0, normalize=False, shadow_soft_size=0.5)
-    (light,), _ = read()
-    sphere_radiance = light.intensity[0] / (pi * 0.5**2)
-    assert sphere_radiance == pytest.approx(8.0 / pi, rel=FLOAT32)
+    """Measured in Cycles 4.5: E = P r^2 / d^2 of a sphere, P / (pi d^2) of a point."""
+    add_lamp("POINT", "Sphere", energy=8.0, normalize=False, shadow_soft_size=0.5)
+    add_lamp("POINT", "Point", energy=8.0, normalize=False, shadow_soft_size=0.0)
+    (sphere, point), _ = read()
+    assert sphere.intensity[0] / (pi * 0.5**2) == pytest.approx(8.0 / pi, rel=FLOAT32)
+    assert point.intensity[0] == pytest.approx(8.0 / pi, rel=FLOAT32)
 
 
 def test_spot_is_a_point_with_a_cone(add_lamp, read):
