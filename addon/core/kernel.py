@@ -104,6 +104,16 @@ class KernelScene:
         self.workers.each_range(len(sides), 8, lambda start, stop: rows(sides[start:stop], out[start:stop]))
         return out
 
+    def openness(self, reaches, rays, seed):
+        """Share of each side's cosine rays that meet nothing within its reach (2 P,) [m]: float32 (2 P,)."""
+        out = np.empty(self.side_count, np.float32)
+
+        def call(start, stop):
+            _kernel.openness(self._scene, self._patches, reaches, start, stop - start, rays, seed, out)
+
+        self.workers.each_range(self.side_count, 4096, call)
+        return out
+
     def shoot(self, first_rays, first_samples, ray_flux, seed):
         """Shoot fixed-point flux along each side's rays: uint64 received (side_count, 3) and escaped (3,)."""
         received, escaped = np.zeros((self.side_count, 3), np.uint64), np.zeros((1, 3), np.uint64)

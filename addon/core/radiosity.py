@@ -26,7 +26,9 @@ PATCH_SKY_RAYS = 4  # of each point
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 MIXED = 0.25  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
 BRIGHT = 5.0  # times the median radiosity: brighter sides are sampled as lights, so that few rays find much light
-REACH = 2.0  # patch sizes: nearer hits go on from the point hit
+CONFINED = 0.5  # a side of which fewer rays leave its reach lies in a gap
+OPENNESS_RAYS = 8
+REACH = 4.0  # patch sizes: nearer hits go on from the point hit
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +41,7 @@ class PatchSolution:
     direct : float32 (2 P, 3) the part of it that is the lights' direct light reflected once [W/m^2]
     reflectance : float32 (P, 3)
     kinds : uint8 (2 P,) EVEN, MIXED (lights reach one part of the side only) or LIGHT (receivers sample it as a light)
-    reaches : float32 (P,) rays that hit from nearer do not take the patch's mean [m]
+    reaches : float32 (2 P,) rays that hit from nearer do not take the side's mean [m]; inf in narrow gaps
     sky : float32 (1, 3) pi times the world's radiance [W/m^2]
     """
 
@@ -55,7 +57,7 @@ class PatchSolution:
         return self.radiosity, self.direct, self.reflectance, self.kinds, self.reaches, self.sky
 
     def __len__(self) -> int:
-        return len(self.reaches)
+        return len(self.reflectance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,7 @@ def solve_radiosity(
         direct=(patches.side_reflectance * direct).astype(np.float32),
         reflectance=np.ascontiguousarray(patches.reflectance, np.float32),
         kinds=kinds,
-        reaches=(REACH * np.sqrt(patches.areas)).astype(np.float32),
+        reaches=_reaches(kernel, patches, settings.seed),
         sky=sky,
     )
     sources = _as_sources(scene, kernel, patches, emitters, solution.radiosity, bright)
@@ -116,6 +118,13 @@ def _side_kinds(patches, radiosity, spread):
     is_mixed = spread * patches.side_reflectance.mean(axis=1) > MIXED * (luminance + typical)
     is_bright = (luminance > BRIGHT * typical) & ~is_mixed & (patches.side_areas > 0)
     return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
+
+
+def _reaches(kernel, patches, seed):
+    """From how near a side's mean is not to be taken, float32 (2 P,) [m]: never, in a gap narrower than its patch."""
+    reaches = np.repeat(REACH * np.sqrt(patches.areas), 2).astype(np.float32)
+    reaches[kernel.openness(reaches, OPENNESS_RAYS, seed) < CONFINED] = np.inf
+    return reaches
 
 
 def _weighted_median(values, weights):
@@ -192,7 +201,7 @@ def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):
         direct=np.zeros((kernel.side_count, 3), np.float32),
         reflectance=np.zeros((len(patches), 3), np.float32),
         kinds=np.full(kernel.side_count, EVEN, np.uint8),
-        reaches=np.zeros(len(patches), np.float32),
+        reaches=np.zeros(kernel.side_count, np.float32),
         sky=sky,
     )
     for chosen, points, _ in _measured(patches):

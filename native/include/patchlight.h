@@ -125,6 +125,16 @@ pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patc
                                    uint32_t positions, uint32_t seed, float *out_rows);
 
 /*
+ * The share of cosine rays from each side that meet nothing within its reach: how much room it has.
+ *
+ *   reaches       2 * patch_count [m]
+ *   first, count  the range of sides
+ *   out_openness  2 * patch_count, at the sides' indices
+ */
+void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *reaches, size_t first,
+                 size_t count, uint32_t rays, uint32_t seed, float *out_openness);
+
+/*
  * Shoot flux along rays from sides to where they land (stochastic Jacobi, Bekaert 1999).
  *
  *   first_rays     2 * patch_count + 1: side s owns rays first_rays[s] .. first_rays[s + 1] - 1
@@ -190,8 +200,9 @@ void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
  *   direct       3 * 2 * patch_count: the part of it that is the lights' direct light reflected once
  *   reflectance  3 * patch_count
  *   kinds        2 * patch_count, a pl_side_kind each
- *   reaches      patch_count: a ray that hits a patch from nearer than this [m] does not take the patch's
- *                mean but goes on from the point hit, as the patch may lie half under something
+ *   reaches      2 * patch_count: a ray that hits a side from nearer than this [m] does not take its mean
+ *                but goes on from the point hit, as the patch may lie half under something; INFINITY for a
+ *                side in a gap narrower than its patch, where no mean can stand for the light
  *   sky          pi * the radiance of what rays see that leave the scene
  */
 typedef enum pl_side_kind {

@@ -198,6 +198,29 @@ static PyObject *form_factors_hemicube(PyObject *self, PyObject *args) {
     return door_result(status);
 }
 
+static PyObject *openness(PyObject *self, PyObject *args) {
+    PyObject *capsules[2], *objects[2];
+    Py_ssize_t first, count;
+    unsigned rays, seed;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOnnIIO", &capsules[0], &capsules[1], &objects[0], &first, &count, &rays,
+                          &seed, &objects[1]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    door_array arrays[] = {{"reaches", 'f', 1, -1, false, {0}}, {"out_openness", 'f', 1, -1, true, {0}}};
+    if (!patches || !door_arrays(objects, arrays, 2))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_openness(scene, patches, arrays[0].view.buf, (size_t)first, (size_t)count, rays, seed,
+                arrays[1].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 2);
+    Py_RETURN_NONE;
+}
+
 static PyObject *shoot(PyObject *self, PyObject *args) {
     PyObject *capsules[2], *objects[5];
     unsigned long long first, count;
@@ -428,6 +451,8 @@ static PyMethodDef methods[] = {
      "form_factors_monte_carlo(scene, patches, sides, rays, seed, out_rows)"},
     {"form_factors_hemicube", form_factors_hemicube, METH_VARARGS,
      "form_factors_hemicube(scene, patches, sides, resolution, positions, seed, out_rows)"},
+    {"openness", openness, METH_VARARGS,
+     "openness(scene, patches, reaches, first, count, rays, seed, out_openness)"},
     {"shoot", shoot, METH_VARARGS,
      "shoot(scene, patches, first_rays, first_samples, ray_flux, first, count, seed, io_received, "
      "io_escaped)"},

@@ -94,7 +94,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
                                 : hit_side(job->patches, &hit);
         if (step == 0 && solution->kinds[side] == PL_SIDE_LIGHT)
             return;
-        const bool is_far = hit.distance >= solution->reaches[side / 2];
+        const bool is_far = hit.distance >= solution->reaches[side];
         if (is_far && solution->kinds[side] != PL_SIDE_MIXED) {
             add(io_sum, solution->radiosity + 3 * side, weight);
             return;
