@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.emitters import LUMINANCE
+from addon.core.emitters import LUMINANCE, emitters_of
+from addon.core.receivers import surface_receivers
 from addon.core.scene import AreaLight, Material, PointLight, SunLight
 from tests.physics.lighting import SINGLE, direct_light, floor, floor_receivers, full_light, random_points
 from tests.reference.polygon import point_to_polygon
-from tests.scenes import BLACK, Part, rectangle, scene_of
+from tests.scenes import BLACK, Part, closed_box, kernel_of, rectangle, scene_of
 
 UP = np.array([0, 0, 1.0])
 COLOUR = np.array([3.0, 2.0, 0.5])
@@ -146,6 +147,21 @@ def test_a_glowing_mesh_of_many_triangles_is_their_sum(points):
     # stated by two halves each, so only the mean over 50 receivers is good, to a factor 1.4 or so
     assert np.sqrt(np.mean(errors**2)) < 1.6 * np.sqrt(variance.mean()) + 1e-4 * exact.max()
     assert values.mean() == pytest.approx(exact.mean(), rel=0.01)
+
+
+@pytest.mark.parametrize("samples", [2, 8, 32])
+def test_few_samples_lose_no_light(samples):
+    """In a box whose walls all glow, each receiver's own wall gives it nothing and the others pi L, at any price."""
+    scene = closed_box(Material("glow", radiance=(1.0, 1.0, 1.0)), (1, 1.3, 0.8))
+    rng = np.random.default_rng(0)
+    triangles = np.repeat(np.arange(12, dtype=np.int32), 100)
+    receivers = surface_receivers(scene, triangles, rng.dirichlet((1, 1, 1), len(triangles)))
+    with kernel_of(scene) as kernel:
+        values, variance, _ = kernel.direct(emitters_of(scene, kernel.centre), receivers, samples, 0)
+    # no bias: four standard errors of the mean, as stated, of 1200 receivers with noise of their own
+    tolerance = 4 * np.sqrt(variance.mean() / len(triangles)) + 1e-3
+    assert values[:, 0].mean() == pytest.approx(np.pi, abs=tolerance)
+    assert values.max() < np.pi * (1 + 1e-3) + 10 * np.sqrt(variance.max())
 
 
 def test_a_constant_sky_gives_pi_l_on_an_open_plane(points):
