@@ -1,0 +1,404 @@
+"""The whole bake on small scenes: what it promises, whatever method and solver it takes."""
+
+import resource
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.bake import bake
+from addon.core.scene import Material, PointLight, SceneError
+from addon.core.settings import BakeCancelled, BakeSettings
+from tests.scenes import (
+    BLACK,
+    Part,
+    box,
+    closed_box,
+    cornell_box,
+    cube_room,
+    kernel_of,
+    rectangle,
+    scene_of,
+    sphere,
+    sphere_in_room,
+)
+
+TEXELS = 48 * 48
+COARSE = 0.12  # [m], of patches: the rooms are 1 m wide, and rows of form factors cost their square
+ROUTES = [
+    ("monte-carlo", "stochastic"),
+    ("monte-carlo", "progressive"),
+    ("monte-carlo", "direct"),
+    ("hemicube", "progressive"),
+    ("hemicube", "direct"),
+]
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def lightmap_of(scene, **settings):
+    """Luminance of the lightmap (H, W) and the report."""
+    result = bake(
+        scene, BakeSettings(**{"texels": TEXELS, "error": 0.05, "threads": 2, "patch_size": COARSE, **settings})
+    )
+    assert result.corner_colours is None
+    return result.lightmap.pixels @ LUMINANCE, result.report
+
+
+def colours_of(scene, **settings):
+    """Luminance of the corner colours (T, 3) and the report."""
+    result = bake(
+        scene, BakeSettings(**{"target": "vertex", "error": 0.05, "threads": 2, "patch_size": COARSE, **settings})
+    )
+    assert result.lightmap is None
+    return result.corner_colours @ LUMINANCE, result.report
+
+
+def relative(first, second):
+    """Local relative difference, as the report's error is defined: of E over E + 0.3 median E."""
+    return (first - second) / (first + 0.3 * np.median(first))
+
+
+@pytest.fixture(scope="module")
+def cornell_lightmaps():
+    scene = cornell_box()
+    return {route: lightmap_of(scene, method=route[0], solver=route[1]) for route in ROUTES}
+
+
+@pytest.mark.parametrize("route", ROUTES[1:], ids="-".join)
+def test_all_methods_and_solvers_bake_the_same_cornell_box(cornell_lightmaps, route):
+    (first, first_report), (second, second_report) = cornell_lightmaps[ROUTES[0]], cornell_lightmaps[route]
+    assert (second_report.method, second_report.solver) == route
+    assert first.shape == second.shape
+    difference = relative(first, second)
+    stated = np.hypot(first_report.estimated_error, second_report.estimated_error)
+    # the estimate covers the sampling at receivers; the patches' own error, of a solver set to the same target,
+    # comes on top and is no larger than that target
+    assert np.sqrt(np.mean(difference**2)) < 1.5 * np.hypot(stated, 0.05)
+    # means over some thousand texels have no sampling noise left: the solvers themselves agree
+    assert np.mean(second) == pytest.approx(np.mean(first), rel=0.02)
+
+
+def test_the_report_tells_what_ran(cornell_lightmaps):
+    for (method, solver), (pixels, report) in cornell_lightmaps.items():
+        assert (report.method, report.solver) == (method, solver)
+        assert report.target_reached
+        assert report.estimated_error <= report.target_error == 0.05
+        assert report.lightmap_size == pixels.shape[::-1]
+        assert report.triangles == len(cornell_box().triangles)
+        assert report.patches > 0
+        assert 0 < report.receivers <= pixels.size
+        assert set(report.seconds) == {"unwrap", "texels", "solve", "gather"}
+        assert report.rays["gather"] > 0
+        balance = report.energy.absorbed + report.energy.escaped + report.energy.unshot
+        assert balance == pytest.approx(report.energy.shot, rel=1e-5)  # float64 sums over float32 form factors
+
+
+@pytest.mark.parametrize("scene", [cornell_box(), cube_room()], ids=["cornell", "lamp"])
+@pytest.mark.parametrize("error", [0.1, 0.03])
+def test_the_estimated_error_is_honest(scene, error):
+    """Two seeds differ by sqrt(2) times the error of one."""
+    runs = [colours_and_errors(scene, error, seed) for seed in (1, 2, 3)]
+    pairs = [(0, 1), (1, 2), (0, 2)]
+    found = np.sqrt(np.mean([np.mean(relative(runs[a][0], runs[b][0]) ** 2) for a, b in pairs]) / 2)
+    stated = np.sqrt(np.mean([estimate**2 for _, estimate in runs]))
+    assert found < 1.5 * stated
+    assert stated < 1.5 * found
+
+
+def colours_and_errors(scene, error, seed):
+    pixels, report = lightmap_of(scene, error=error, seed=seed)
+    return pixels, report.estimated_error
+
+
+@pytest.mark.parametrize("target", ["lightmap", "vertex"])
+def test_the_same_bytes_at_any_number_of_threads(target):
+    results = [bake_bytes(cornell_box(), target=target, threads=threads) for threads in (1, 2, 4)]
+    assert results[1] == results[0]
+    assert results[2] == results[0]
+
+
+@pytest.mark.parametrize("target", ["lightmap", "vertex"])
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_ones(target):
+    first, again, other = (bake_bytes(cube_room(), target=target, seed=seed) for seed in (5, 5, 6))
+    assert first == again
+    assert first != other
+
+
+def bake_bytes(scene, **settings):
+    result = bake(scene, BakeSettings(**{"texels": TEXELS, "error": 0.1, "patch_size": COARSE, **settings}))
+    return (result.lightmap.pixels if result.lightmap else result.corner_colours).tobytes()
+
+
+@pytest.mark.parametrize("solver", ["direct", "progressive", "stochastic"])
+@pytest.mark.parametrize("rho", [0.5, 0.8])
+def test_furnace(solver, rho):
+    """Every wall of a closed box glows with L: E = pi L / (1 - rho) at every receiver, in every channel."""
+    radiance = np.array([2.0, 1.0, 0.5])
+    scene = closed_box(Material("glow", (rho,) * 3, radiance=tuple(radiance)), (1, 1.3, 0.8))
+    result = bake(scene, BakeSettings(target="vertex", solver=solver, error=0.02, threads=2, patch_size=0.25))
+    found = result.corner_colours / (radiance / (1 - rho))
+    # of the bounced light rho / (1 - rho): 0.001 not shot; the rest is the error asked for
+    assert found.mean() == pytest.approx(1, abs=0.01)
+    assert np.sqrt(np.mean((found - 1) ** 2)) < 0.02 * 1.5 + 1e-3
+
+
+def test_furnace_in_a_lightmap():
+    scene = closed_box(Material("glow", (0.5,) * 3, radiance=(1.0, 1.0, 1.0)))
+    pixels, report = lightmap_of(scene, error=0.02)
+    assert pixels.mean() == pytest.approx(2, rel=0.01)
+    assert np.sqrt(np.mean((pixels / 2 - 1) ** 2)) < 1.5 * report.estimated_error + 5e-3
+
+
+def test_a_lamp_in_a_black_room_gives_the_cosine_law_on_the_texels():
+    scene = cube_room(material=BLACK)
+    result = bake(scene, BakeSettings(texels=TEXELS, error=0.1, threads=2))
+    lamp = scene.lights[0]
+    inside = np.random.default_rng(0).dirichlet((4, 4, 4), len(scene.triangles))
+    points = np.einsum("tk,tkc->tc", inside, scene.corners)
+    to = np.asarray(lamp.position) - points
+    cosine = np.einsum("tc,tc->t", to, scene.corner_normals[:, 0]) / np.linalg.norm(to, axis=1)
+    exact = cosine / (to**2).sum(axis=1) * lamp.intensity[0] / np.pi
+    uvs = np.einsum("tk,tkc->tc", inside, result.lightmap.uvs)
+    height, width, _ = result.lightmap.pixels.shape
+    x, y = (uvs * [width, height] - 0.5).T
+    column, row = np.floor([x, y]).astype(int)
+    found = np.zeros(len(x))
+    for right in (0, 1):
+        for up in (0, 1):
+            weight = np.abs(1 - right - (x - column)) * np.abs(1 - up - (y - row))
+            found += weight * result.lightmap.pixels[row + up, column + right, 0]
+    # bilinear lookup between texels 4 cm apart, 30 cm and more from the lamp: second derivative times h^2 / 8
+    assert found == pytest.approx(exact, rel=0.02)
+
+
+def test_objects_that_are_no_targets_stay_empty():
+    scene = cornell_box()
+    lamp = scene.objects[-1].span
+    colours = bake(scene, BakeSettings(target="vertex", error=0.3)).corner_colours
+    assert np.isnan(colours[lamp]).all()
+    assert np.isfinite(np.delete(colours, np.r_[lamp], axis=0)).all()
+    uvs = bake(scene, BakeSettings(texels=1024, error=0.3)).lightmap.uvs
+    assert np.isnan(uvs[lamp]).all()
+    assert np.isfinite(np.delete(uvs, np.r_[lamp], axis=0)).all()
+
+
+def without_targets():
+    return scene_of([Part(np.zeros((3, 3)), [], name="empty"), box((0, 0, 0), (1, 1, 1), is_target=False)])
+
+
+@pytest.mark.parametrize("target", ["lightmap", "vertex"])
+def test_a_scene_without_faces_to_bake_is_refused(target):
+    with pytest.raises(SceneError, match="no target object"):
+        bake(without_targets(), BakeSettings(target=target))
+
+
+@pytest.mark.parametrize("target", ["lightmap", "vertex"])
+def test_an_empty_object_beside_others_is_no_trouble(target):
+    empty = Part(np.zeros((3, 3)), [], name="empty")
+    plain = bake_bytes(scene_of([box((0, 0, 0), (1, 1, 1), inwards=True)]), target=target)
+    scene = scene_of([box((0, 0, 0), (1, 1, 1), inwards=True), empty])
+    assert bake_bytes(scene, target=target) == plain
+
+
+@pytest.mark.parametrize("target", ["lightmap", "vertex"])
+def test_darkness_bakes_to_zero(target):
+    result = bake(closed_box(), BakeSettings(target=target, texels=1024))
+    pixels = result.lightmap.pixels if result.lightmap else result.corner_colours
+    assert (pixels == 0).all()
+    assert result.report.target_reached
+
+
+@pytest.mark.parametrize("target", ["lightmap", "vertex"])
+def test_faces_without_area_bake_to_finite_colours(target):
+    sliver = Part([(0.2, 0.2, 0.5), (0.4, 0.4, 0.5), (0.8, 0.8, 0.5)], [(0, 1, 2)], name="sliver")
+    scene = scene_of([box((0, 0, 0), (1, 1, 1), inwards=True), sliver], cube_room().lights)
+    result = bake(scene, BakeSettings(target=target, texels=1024, error=0.2))
+    assert np.isfinite(result.lightmap.pixels if result.lightmap else result.corner_colours).all()
+
+
+@pytest.mark.parametrize("settings", [{"target": "vertex"}, {}, {"solver": "progressive"}, {"solver": "direct"}])
+def test_progress_rises_to_the_end_and_comes_from_the_calling_thread(settings):
+    told = []
+
+    def on_progress(stage, fraction):
+        told.append((stage, fraction, threading.get_ident()))
+        return True
+
+    result = bake(
+        cornell_box(), BakeSettings(texels=1024, error=0.2, threads=2, patch_size=COARSE, **settings), on_progress
+    )
+    fractions = [fraction for _, fraction, _ in told]
+    assert {thread for _, _, thread in told} == {threading.get_ident()}
+    assert {stage for stage, _, _ in told} <= set(result.report.seconds)
+    assert fractions == sorted(fractions)
+    assert 0 <= fractions[0]
+    assert fractions[-1] <= 1
+
+
+@pytest.mark.parametrize("target", ["lightmap", "vertex"])
+def test_a_bake_can_be_cancelled_at_every_stage_and_leaves_no_thread(target):
+    seen = []
+    bake(cube_room(), BakeSettings(target=target, texels=1024, error=0.2), lambda s, f: seen.append(s) or True)
+    before = threading.active_count()
+    for stage in dict.fromkeys(seen):
+        calls = []
+
+        def stop_at(current, _, stage=stage, calls=calls):
+            calls.append(current)
+            return current != stage
+
+        with pytest.raises(BakeCancelled):
+            bake(cube_room(), BakeSettings(target=target, texels=1024, error=0.2, threads=4), stop_at)
+        # once told to stop it asks no more
+        assert calls.count(stage) == 1
+        assert threading.active_count() == before
+
+
+def test_a_bake_after_a_cancelled_one_is_as_if_nothing_had_been():
+    first = bake_bytes(cube_room())
+    with pytest.raises(BakeCancelled):
+        bake(cube_room(), BakeSettings(texels=TEXELS), lambda stage, fraction: stage != "gather")
+    assert bake_bytes(cube_room()) == first
+
+
+def test_an_exception_of_the_callback_comes_out_as_it_is():
+    def fail(stage, fraction):
+        raise KeyError(stage)
+
+    before = threading.active_count()
+    with pytest.raises(KeyError):
+        bake(cube_room(), BakeSettings(texels=1024, threads=4), fail)
+    assert threading.active_count() == before
+
+
+def test_a_time_limit_ends_sampling_and_the_report_says_so():
+    result = bake(cornell_box(), BakeSettings(texels=1024, error=0.005, time_limit=1e-3, patch_size=COARSE))
+    assert not result.report.target_reached
+    assert result.report.estimated_error > 0.005
+    assert any("time limit" in warning for warning in result.report.warnings)
+    assert np.isfinite(result.lightmap.pixels).all()
+
+
+def test_a_smaller_error_is_asked_for_and_given():
+    reports = [lightmap_of(cornell_box(), error=error, texels=1024)[1] for error in (0.2, 0.05)]
+    assert reports[0].estimated_error <= 0.2
+    assert reports[1].estimated_error <= 0.05
+    assert reports[0].rays["gather"] < reports[1].rays["gather"]
+
+
+# ---- smooth surfaces and sharp edges: a far lamp and nothing else, so that irradiance is known ----
+
+FAR = PointLight("far", (30.0, -20.0, 25.0), (1e4, 1e4, 1e4))
+
+
+def exact_colours(points, normals):
+    """E / pi of the far lamp on a convex black body."""
+    to = np.asarray(FAR.position) - points
+    distance = np.linalg.norm(to, axis=-1)
+    return np.maximum((to * normals).sum(axis=-1), 0) / distance**3 * FAR.intensity[0] / np.pi
+
+
+def ball_scene():
+    return scene_of([sphere((0, 0, 0), 1, rings=24, segments=48, material=BLACK)], [FAR])
+
+
+def test_a_smooth_sphere_is_smooth_in_vertex_colours():
+    scene = ball_scene()
+    colours, _ = colours_of(scene, error=0.05)
+    normals = scene.corner_normals.astype(np.float64)
+    exact = exact_colours(scene.corners, normals)
+    step = np.pi / 24  # between neighbouring vertices [rad]
+    full = exact.max()
+    # the mean of the adjoining faces' receivers is that of a neighbourhood of a step, across the terminator, too
+    assert np.abs(colours - exact).max() < 0.5 * step * full
+    jumps = np.abs(colours[:, [0, 1, 2]] - colours[:, [1, 2, 0]])
+    # E changes by at most full sin(angle) between neighbours: nothing may jump more than half as much again
+    assert jumps.max() < 1.5 * step * full
+
+
+def test_corners_of_a_smooth_vertex_share_their_colour():
+    scene = ball_scene()
+    colours = bake(scene, BakeSettings(target="vertex", error=0.3)).corner_colours
+    for vertex in range(0, len(scene.vertices), 37):
+        shared = colours[scene.triangles == vertex]
+        assert (shared == shared[0]).all()
+
+
+def test_a_smooth_sphere_is_smooth_in_a_lightmap():
+    scene = ball_scene()
+    result = bake(scene, BakeSettings(texels=128 * 128, error=0.05, threads=2))
+    pixels = result.lightmap.pixels @ LUMINANCE
+    height, width = pixels.shape
+    full = exact_colours(scene.corners, scene.corner_normals).max()
+    weights = np.random.default_rng(0).dirichlet((3, 3, 3), len(scene.triangles))
+    normals = np.einsum("tk,tkc->tc", weights, scene.corner_normals)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    uvs = np.einsum("tk,tkc->tc", weights, result.lightmap.uvs) * [width, height]
+    found = pixels[uvs[:, 1].astype(int), uvs[:, 0].astype(int)]
+    exact = exact_colours(normals, normals)
+    texel = np.sqrt(4 * np.pi / (0.5 * height * width))  # [rad], where half of the image is used
+    # the nearest texel is off by less than one, along which E changes by at most full sin(angle)
+    assert np.abs(found - exact).max() < 1.5 * texel * full
+
+
+def test_the_two_sides_of_a_cubes_edge_differ():
+    cube = box((-1, -1, -1), (1, 1, 1), material=BLACK)
+    scene = scene_of([cube], [FAR])
+    exact = exact_colours(scene.corners, scene.corner_normals.astype(np.float64))
+    colours, _ = colours_of(scene)
+    # receivers stand up to 17 cm inside their faces; the lamp is 44 m away
+    assert colours == pytest.approx(exact, rel=0.03, abs=1e-6)
+    result = bake(scene, BakeSettings(texels=TEXELS, error=0.05))
+    pixels = result.lightmap.pixels @ LUMINANCE
+    height, width = pixels.shape
+    # a little inside each corner of each triangle
+    weights = np.eye(3) * 0.94 + 0.02
+    places = np.einsum("ck,tkx->tcx", weights, result.lightmap.uvs) * [width, height]
+    found = pixels[places[..., 1].astype(int), places[..., 0].astype(int)]
+    assert found == pytest.approx(exact, rel=0.03, abs=1e-6)
+
+
+def test_faces_in_one_plane_share_colours_but_not_across_an_edge_marked_sharp():
+    """A sheet of two quads, the left one in the shadow of a board whose edge stands above the edge between them."""
+    sheet = rectangle((0, 0, 0), (2, 0, 0), (0, 1, 0), cuts=(2, 1), material=BLACK)
+    board = rectangle((0, -1, 0.5), (1, 0, 0), (0, 3, 0), is_target=False)
+    scene = scene_of([sheet, board], [replace(FAR, position=(1.0, 0.5, 40.0))])
+    triangles = scene.triangles[:4]
+    middle = np.isin(triangles, [1, 4])
+    sharp = middle & np.roll(middle, -1, axis=1)
+    assert sharp.sum() == 2
+    objects = (replace(scene.objects[0], sharp_edges=sharp), scene.objects[1])
+    soft, marked = (colours_of(s)[0][:4] for s in (scene, replace(scene, objects=objects)))
+    is_left = np.arange(4)[:, None] < 2
+    assert marked[middle & is_left] == pytest.approx(0, abs=1e-12)
+    # 40 m overhead, at a cosine within 1e-3 of 1
+    assert marked[middle & ~is_left] == pytest.approx(1e4 / 40**2 / np.pi, rel=2e-3)
+    for vertex in (1, 4):
+        shared = soft[triangles == vertex]
+        assert np.ptp(shared) < 1e-6 * shared.max()
+        assert 0 < shared[0] < 1e4 / 40**2 / np.pi
+
+
+def test_a_smooth_ball_in_a_closed_room_loses_no_light():
+    """Furnace with a smooth ball: shading normals neither make nor lose light."""
+    scene = sphere_in_room((), Material("glow", (0.5,) * 3, radiance=(1.0, 1.0, 1.0)))
+    colours, _ = colours_of(scene, error=0.02)
+    ball = scene.objects[1].span
+    assert colours[ball].mean() == pytest.approx(2, rel=0.02)
+    # near the facets' silhouettes a few rays graze their own ball
+    assert np.abs(colours[ball] / 2 - 1).max() < 0.15
+
+
+def test_kernels_are_freed():
+    """Scenes come and go: what a thousand of them hold is returned."""
+    for _ in range(50):
+        with kernel_of(closed_box()):
+            pass
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for _ in range(500):
+        with kernel_of(cornell_box()):
+            pass
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before  # [KiB]
+    # a BVH of this scene alone takes some 20 KiB: 500 of them kept would be 10 MiB
+    assert grown < 5000
