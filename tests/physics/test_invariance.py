@@ -59,8 +59,7 @@ def test_a_model_in_millimetres_or_kilometres_gives_the_same_light(seeds, scale)
 def test_a_hundred_kilometres_from_the_origin_the_light_is_the_same(seeds):
     values, _ = colours(moved(room(), offset=(1e5, -2e5, 1e5)), 1)
     # doubles hold 1e-11 m there, and the kernel re-centres them before they become floats
-    assert relative_rms(seeds[0], values) < seeds[1]
-    assert np.median(np.abs(values / seeds[0] - 1)) < 1e-3
+    assert relative_rms(seeds[0], values) < seeds[1] / 2
 
 
 @pytest.mark.parametrize("seed", range(3))
