@@ -121,7 +121,7 @@ def _cuts(n):
 
 
 def _groups(corners, radiances):
-    """Order of the triangles, and (first, count) of each group in it: near each other, split where the most light is."""
+    """Order of the triangles, and (first, count) of each group in it: neighbours, split where the most light is."""
     middles = corners.mean(axis=1)
     flux = _flux(corners, radiances)
     waiting, done = ([np.arange(len(corners))] if len(corners) else []), []

@@ -13,8 +13,11 @@ from .receivers import Receivers
 from .smoothing import TexelGrid, smoothed
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
-FIRST_RAYS = 8  # a replicate's rays in the first pass; every further pass doubles what there is
-MOST_RAYS = 1 << 10  # of a replicate
+FIRST_RAYS = 8  # a replicate's rays in the first pass
+GROWTH = 4  # every further pass brings those that need it to so many times as many
+MOST_RAYS = 512  # of a replicate
+PROBES = 2048  # receivers at which the result is measured anew, to know its error
+PROBE_RAYS = 128  # of a replicate
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
 DARK = 0.3  # of the median irradiance: what is added to a receiver's own before its error is called relative
 
@@ -42,6 +45,21 @@ def shadow_samples(error: float) -> int:
     return int(min(max(2 ** round(np.log2(3.2 / error)), 16), 2048))
 
 
+@dataclass(frozen=True, slots=True)
+class _Job:
+    """What all passes share."""
+
+    kernel: KernelScene
+    emitters: Emitters
+    solution: PatchSolution
+    receivers: Receivers
+
+    def gather(self, selected, first, take, seed, sums, on_step=None) -> int:
+        return self.kernel.gather(
+            self.solution, self.emitters, self.receivers, selected, REPLICATES, first, take, seed, sums, on_step
+        )
+
+
 def gather_irradiance(
     kernel: KernelScene,
     emitters: Emitters,
@@ -53,7 +71,7 @@ def gather_irradiance(
     is_late,
     on_step,
 ) -> Irradiance:
-    """Direct plus gathered irradiance at receivers.
+    """Direct plus gathered irradiance at receivers, and how wrong it is.
 
     Parameters
     ----------
@@ -63,63 +81,75 @@ def gather_irradiance(
     is_late : () -> bool, whether the time limit has passed; the first pass is always finished
     on_step : (0..1) -> None
     """
-    direct, direct_variance, shadow_rays = kernel.direct(
-        emitters, receivers, shadow_samples(error), seed, lambda done: on_step(0.3 * done)
+    if not len(receivers):
+        return Irradiance(np.zeros((0, 3), np.float32), 0.0, True, {"direct": 0, "gather": 0})
+    job = _Job(kernel, emitters, solution, receivers)
+    direct, _, shadow_rays = kernel.direct(
+        emitters, receivers, shadow_samples(error), seed, lambda done: on_step(0.25 * done)
     )
-    sums = np.zeros((len(receivers), REPLICATES, 3), np.float32)
-    counts = np.zeros(len(receivers), np.int64)
-    active = np.arange(len(receivers), dtype=np.uint32)
-    reached, done, take, rays = True, 0, FIRST_RAYS, 0
-    estimate = _Estimate(direct, direct_variance, np.zeros(len(receivers)), np.zeros(len(receivers)))
-    while len(active):
-        share, width = 0.3 + 0.7 * done / MOST_RAYS, 0.7 * take / MOST_RAYS
-        rays += kernel.gather(
-            solution, emitters, receivers, active, REPLICATES, done, take, seed, sums,
-            lambda part: on_step(share + width * part),
-        )  # fmt: skip
-        counts[active] += take
-        done, take = done + take, done + take
-        estimate = _estimate(kernel.workers, grid, receivers, sums, counts, direct, direct_variance)
-        active = active[estimate.noise[active] > error] if done < MOST_RAYS else active[:0]
-        if len(active) and is_late():
-            reached = False
-            break
-    rms = float(np.sqrt(max(estimate.squared_errors.mean(), 0.0))) if len(receivers) else 0.0
-    traced = {"direct": int(shadow_rays), "gather": int(rays)}
-    return Irradiance(estimate.values, rms, reached and rms <= error, traced)
+    gathered, _, rays, in_time = _gather_until(job, grid, direct, error, seed, is_late, on_step)
+    values = (direct + gathered).astype(np.float32)
+    on_step(0.97)
+    rms, probe_rays = _probe(job, values, error, seed + 1)
+    traced = {"direct": int(shadow_rays), "gather": int(rays), "probe": int(probe_rays)}
+    return Irradiance(values, rms, in_time and rms <= error, traced)
 
 
-@dataclass(frozen=True, slots=True)
-class _Estimate:
-    """Irradiance so far.
+def _gather_until(job: _Job, grid, direct, error, seed, is_late, on_step):
+    """Gathered light (N, 3), its variance (N,), the rays, and whether the time limit let all passes be made."""
+    count = len(job.receivers)
+    sums, taken = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64)
+    active = np.arange(count, dtype=np.uint32)
+    first, take, rays = 0, FIRST_RAYS, 0
+    while True:
+        # later passes are for few receivers: half of the bar is the first, a half of what is left each later one
+        begin = 0.95 - 0.7 * 0.5 ** np.log2(1 + first / FIRST_RAYS)
+        width = 0.35 if first == 0 else 0.5 * (0.95 - begin)
+        rays += job.gather(active, first, take, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
+        taken[active] += take
+        first, take = first + take, (GROWTH - 1) * (first + take)
+        gathered, variance = _estimate(job, grid, sums / taken[:, None, None])
+        relative = np.sqrt(variance) / _scale(direct + gathered)
+        # once the whole is good enough, only what would show as a speckle goes on
+        limit = error if np.sqrt(np.mean(relative**2)) > error else 2 * error
+        active = active[relative[active] > limit]
+        if not len(active) or first >= MOST_RAYS:
+            return gathered, variance, rays, True
+        if is_late():
+            return gathered, variance, rays, False
 
-    ``noise``: relative standard error of the gathered light, which says whether more rays are due; ``squared_errors``: of
-    the whole, relative, bias of smoothing included, meaningful as a mean only.
-    """
 
-    values: np.ndarray
-    variance: np.ndarray
-    noise: np.ndarray
-    squared_errors: np.ndarray
+def _estimate(job, grid, means):
+    if grid is not None:
+        return smoothed(job.kernel.workers, grid, job.receivers, means)
+    variance = (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES
+    pooled = np.convolve(variance, np.full(POOL, 1 / POOL), "same") if len(variance) >= POOL else variance
+    return means.mean(axis=1), pooled
 
 
-def _estimate(workers, grid, receivers, sums, counts, direct, direct_variance):
-    means = sums / np.maximum(counts, 1)[:, None, None]
-    if grid is None:
-        gathered = means.mean(axis=1)
-        variance = (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES
-        squared_errors = variance
-        noise = np.convolve(variance, np.full(POOL, 1 / POOL), "same") if len(variance) >= POOL else variance
-    else:
-        smooth = smoothed(workers, grid, receivers, means)
-        gathered, variance, squared_errors, noise = smooth.values, smooth.variances, smooth.squared_errors, smooth.variances
-    total = direct + gathered
-    luminance = total @ LUMINANCE
+def _scale(irradiance):
+    """What an error is relative to: the luminance, and a share of its median where that is dark, (N,) [W/m^2]."""
+    luminance = irradiance @ LUMINANCE
     lit = luminance[luminance > 1e-4 * max(luminance.mean(), 1e-30)]
-    scale = luminance + DARK * (np.median(lit) if len(lit) else 1.0)
-    return _Estimate(
-        values=total.astype(np.float32),
-        variance=variance + direct_variance,
-        noise=np.sqrt(noise) / scale,
-        squared_errors=(squared_errors + direct_variance) / scale**2,
-    )
+    return luminance + DARK * (np.median(lit) if len(lit) else 1.0)
+
+
+def _probe(job: _Job, values, error, seed):
+    """Relative RMS error of the values, and the rays it took to know it.
+
+    Some receivers are measured anew, with other and many more rays and without smoothing; what the values differ from
+    that, less what it is itself uncertain by, is their error, noise and smoothing alike.
+    """
+    chosen = np.unique(np.linspace(0, len(values) - 1, PROBES).round().astype(np.uint32))
+    scale = _scale(values)[chosen]
+    part = Receivers(*(array[chosen] for array in job.receivers.arrays()))
+    direct, variance, shadow_rays = job.kernel.direct(job.emitters, part, 4 * shadow_samples(error), seed)
+    everyone = np.arange(len(chosen), dtype=np.uint32)
+    sums = np.zeros((len(chosen), REPLICATES, 3), np.float32)
+    rays = _Job(job.kernel, job.emitters, job.solution, part).gather(everyone, 0, PROBE_RAYS, seed, sums)
+    truth = (sums / PROBE_RAYS) @ LUMINANCE
+    variance = variance + truth.var(axis=1, ddof=1) / REPLICATES
+    difference = values[chosen] @ LUMINANCE - direct @ LUMINANCE - truth.mean(axis=1)
+    # one wrong receiver counts as one, however wrong
+    squares = np.minimum((difference / scale) ** 2, 1.0) - np.minimum(variance / scale**2, 1.0)
+    return float(np.sqrt(max(squares.mean(), 0.0))), shadow_rays + rays

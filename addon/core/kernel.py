@@ -58,7 +58,7 @@ class KernelScene:
         self.side_count = 0
 
     def closest_hits(self, origins, directions):
-        """First opaque triangle along rays (N, 3): indices int32 (N,), -1 for none, and (u, v, distance) float32 (N, 3)."""
+        """First opaque triangle along rays (N, 3): index int32 (N,), -1 = none; (u, v, distance) float32 (N, 3)."""
         triangles, hits = np.empty(len(origins), np.int32), np.empty((len(origins), 3), np.float32)
         _kernel.closest_hits(self._scene, _rows(origins, np.float64), _rows(directions, np.float32), triangles, hits)
         return triangles, hits
@@ -159,7 +159,7 @@ class KernelScene:
 
 
 def smooth(workers, grid, receivers, values, variances, step, stops_on_value):
-    """One level of edge-stopping smoothing: values float32 (N, 4), variances float32 (N,) of their luminance.
+    """One level of edge-stopping smoothing: values float32 (N, 3), variances float32 (N,) of their luminance.
 
     ``grid`` is a smoothing.TexelGrid; what the arguments mean: native/include/patchlight.h, pl_smooth.
     """

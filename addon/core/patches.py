@@ -107,7 +107,7 @@ def subdivide(scene: Scene, kernel: KernelScene, size: float, budget: int, seed:
 
 
 def patch_triangles(scene: Scene, patches: Patches, chosen):
-    """Corners of two triangles that make up each chosen patch (K,), wound as the triangle it is of: float64 (K, 2, 3, 3) [m]."""
+    """Two triangles that make up each chosen patch (K,), wound as its triangle: corners float64 (K, 2, 3, 3) [m]."""
     triangles = patches.triangles[chosen]
     corners, apexes = scene.corners[triangles], patches.apexes[triangles].astype(int)
     rows = np.arange(len(triangles))

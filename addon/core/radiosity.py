@@ -17,7 +17,7 @@ from .transport import form_factors
 
 EVEN, MIXED_SIDE, LIGHT = 0, 1, 2  # kinds of sides, as the kernel has them
 # patches, about, that each solver is given; triangles are never joined, so there may be more
-PATCH_BUDGETS = {"direct": 1200, "progressive": 3000, "stochastic": 30000}
+PATCH_BUDGETS = {"direct": 1200, "progressive": 3000, "stochastic": 60000}
 DIRECT_TRIANGLES, PROGRESSIVE_TRIANGLES = 150, 1500  # up to which "auto" takes them
 POINTS = 8  # of a patch side: where its direct light is measured
 SMALL = 0.25  # of a full-size patch's area: smaller ones are measured at one point
@@ -25,10 +25,11 @@ PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 
 PATCH_SKY_RAYS = 4  # of each point
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 MIXED = 0.25  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
-BRIGHT = 5.0  # times the median radiosity: brighter sides are sampled as lights, so that few rays find much light
+BRIGHT = 20.0  # times the median radiosity: brighter sides are sampled as lights, which few gather rays would find
+BRIGHT_SHARE = 0.005  # of all area that they may be: where much is bright, gather rays find it well
 CONFINED = 0.5  # a side of which fewer rays leave its reach lies in a gap
 OPENNESS_RAYS = 8
-REACH = 4.0  # patch sizes: nearer hits go on from the point hit
+REACH = 3.0  # patch sizes: nearer hits go on from the point hit
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +82,7 @@ class Solved:
     rays: dict[str, int]
 
 
-def solve_radiosity(
-    scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, on_step
-) -> Solved:
+def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, on_step) -> Solved:
     """Subdivide, measure direct light on the patches, solve for the light that bounces."""
     solver, method, choice = choose(settings, len(scene.triangles))
     budget = PATCH_BUDGETS[solver]
@@ -117,6 +116,7 @@ def _side_kinds(patches, radiosity, spread):
     typical = _weighted_median(luminance[lit], patches.side_areas[lit]) if len(lit) else 0.0
     is_mixed = spread * patches.side_reflectance.mean(axis=1) > MIXED * (luminance + typical)
     is_bright = (luminance > BRIGHT * typical) & ~is_mixed & (patches.side_areas > 0)
+    is_bright &= _brightest(luminance, patches.side_areas, BRIGHT_SHARE)
     return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
 
 
@@ -125,6 +125,14 @@ def _reaches(kernel, patches, seed):
     reaches = np.repeat(REACH * np.sqrt(patches.areas), 2).astype(np.float32)
     reaches[kernel.openness(reaches, OPENNESS_RAYS, seed) < CONFINED] = np.inf
     return reaches
+
+
+def _brightest(luminance, areas, share):
+    """The brightest sides that make up at most ``share`` of the area, bool (2 P,)."""
+    order = np.argsort(-luminance, kind="stable")
+    chosen = np.zeros(len(luminance), bool)
+    chosen[order[np.cumsum(areas[order]) <= share * areas.sum()]] = True
+    return chosen
 
 
 def _weighted_median(values, weights):
@@ -140,7 +148,9 @@ def _as_sources(scene, kernel, patches, emitters, radiosity, bright):
     radiances[np.arange(len(bright)), bright % 2] = radiance_from_exitance(radiosity[bright])
     corners = corners.reshape(-1, 3, 3)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return with_sources(emitters, corners[areas > 0], np.repeat(radiances.reshape(-1, 6), 2, axis=0)[areas > 0], kernel.centre)
+    return with_sources(
+        emitters, corners[areas > 0], np.repeat(radiances.reshape(-1, 6), 2, axis=0)[areas > 0], kernel.centre
+    )
 
 
 def _solve(kernel, patches, emitted, solver, method, settings, on_step) -> Solution:
@@ -153,9 +163,7 @@ def _solve(kernel, patches, emitted, solver, method, settings, on_step) -> Solut
         return solve_progressive(estimator, reflectance, emitted, areas, UNSHOT_LIMIT, on_step)
     require_direct_size(len(emitted))
     rows = estimator.rows(np.arange(len(emitted)))
-    return replace(
-        solve_direct(rows, reflectance, emitted, areas), rays=estimator.rays_per_row * len(emitted)
-    )
+    return replace(solve_direct(rows, reflectance, emitted, areas), rays=estimator.rays_per_row * len(emitted))
 
 
 def choose(settings: BakeSettings, triangle_count: int) -> tuple[str, str, str]:

@@ -64,7 +64,7 @@ def _lift(positions, corners, corner_normals, weights, flat):
 
 
 def patch_receivers(scene: Scene, kernel: KernelScene, patches, samples: int, seed: int) -> Receivers:
-    """``samples`` receivers on each side of the patches (K,): row (2 k + side) * samples + i is point i of patches[k]."""
+    """``samples`` receivers on each side of patches (K,): row (2 k + side) * samples + i is point i of patch k."""
     triangles, barycentrics = kernel.patch_points(patches, samples, seed)
     corners = scene.corners[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

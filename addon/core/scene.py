@@ -75,8 +75,9 @@ class Material:
 class PointLight:
     """A small sphere, or a point where the radius is 0. I = P / (4 pi).
 
-    ``cone_cosines`` makes it a spot: full inside cos >= cone_cosines[1], none outside cos <= cone_cosines[0], smoothstep
-    between; ``direction`` is where it looks. ``soft_falloff``: a disc that always faces the receiver, as Cycles does it.
+    ``cone_cosines`` makes it a spot: full inside cos >= cone_cosines[1], none outside cos <= cone_cosines[0],
+    smoothstep between; ``direction`` is where it looks. ``soft_falloff``: a disc that always faces the receiver, as
+    Cycles does it.
     """
 
     name: str
@@ -93,7 +94,7 @@ class AreaLight:
     """A flat emitter that lights the side ``axis_u x axis_v`` looks to, and blocks no light.
 
     The rectangle centre +- axis_u +- axis_v, or the ellipse with these half axes. ``spread`` < pi narrows the beam:
-    L (max(0, tan(s/2) - tan(a))) / (tan(s/2) - s/2), a the angle from the normal (Cycles' area light).
+    L max(0, tan(s/2) - tan(a)) / (tan(s/2) - s/2), a the angle from the normal (Cycles' area light).
     """
 
     name: str
@@ -124,10 +125,12 @@ class SceneObject:
     name : str
     first, count : its triangles are ``triangles[first : first + count]``
     is_target : whether receivers are placed on it
-    polygons : int32 (count,) which polygon of the object's mesh each triangle is part of: a polygon's triangles stay together in a chart
+    polygons : int32 (count,) which polygon of the object's mesh each triangle is part of: a polygon's triangles stay
+        together in a chart
     corners : int32 (count, 3) which face corner (Blender: loop) of the object's mesh each triangle corner is
     lightmap_uvs : float32 (count, 3, 2) or None, the existing "Lightmap" UVs, for ``keep_uvs``
-    sharp_edges : bool (count, 3) edge k runs from triangle corner k to corner (k + 1) % 3; True = values are not shared across it
+    sharp_edges : bool (count, 3) edge k runs from triangle corner k to corner (k + 1) % 3; True = vertex colours are
+        not shared across it
     """
 
     name: str

@@ -51,7 +51,9 @@ def solve_direct(form_factors, reflectance, emitted, areas) -> Solution:
         radiosity[:, channel] = np.linalg.solve(system, emitted[:, channel])
     rest = emitted + reflectance * (form_factors @ radiosity) - radiosity
     largest = float(np.abs(rest).max(initial=0.0) / max(np.abs(emitted).max(initial=0.0), 1e-300))
-    return Solution(radiosity, (largest,), _dense_energy(form_factors, reflectance, emitted, areas, radiosity), 0, "direct")
+    return Solution(
+        radiosity, (largest,), _dense_energy(form_factors, reflectance, emitted, areas, radiosity), 0, "direct"
+    )
 
 
 def _dense_energy(form_factors, reflectance, emitted, areas, radiosity):

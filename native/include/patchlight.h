@@ -56,8 +56,8 @@ void pl_embree_close(pl_embree *embree);
  */
 typedef struct pl_scene pl_scene;
 pl_status pl_scene_create(const pl_embree *embree, const double *vertices, size_t vertex_count,
-                          const int32_t *triangles, size_t triangle_count,
-                          const float *transmittance, pl_scene **out_scene);
+                          const int32_t *triangles, size_t triangle_count, const float *transmittance,
+                          pl_scene **out_scene);
 void pl_scene_destroy(pl_scene *scene);
 
 /*
@@ -68,12 +68,11 @@ void pl_scene_destroy(pl_scene *scene);
  *   out_hits             3 * count: u, v (weights of corners 1 and 2) and distance in units of the
  *                        direction's length
  */
-void pl_closest_hits(const pl_scene *scene, const double *origins, const float *directions,
-                     size_t count, int32_t *out_triangles, float *out_hits);
+void pl_closest_hits(const pl_scene *scene, const double *origins, const float *directions, size_t count,
+                     int32_t *out_triangles, float *out_hits);
 
 /* 1 where an opaque triangle lies between the two points, ends excluded, else 0. */
-void pl_occluded(const pl_scene *scene, const double *from, const double *to, size_t count,
-                 uint8_t *out_occluded);
+void pl_occluded(const pl_scene *scene, const double *from, const double *to, size_t count, uint8_t *out_occluded);
 
 /*
  * How triangles are cut into patches: rows parallel to the longest edge, columns across each row that
@@ -87,8 +86,7 @@ void pl_occluded(const pl_scene *scene, const double *from, const double *to, si
  */
 typedef struct pl_patches pl_patches;
 pl_status pl_patches_create(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
-                            const int32_t *first_patches, size_t row_count,
-                            pl_patches **out_patches);
+                            const int32_t *first_patches, size_t row_count, pl_patches **out_patches);
 void pl_patches_destroy(pl_patches *patches);
 
 /*
@@ -99,9 +97,8 @@ void pl_patches_destroy(pl_patches *patches);
  *   out_triangles     count * samples
  *   out_barycentrics  3 * count * samples floats
  */
-pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, size_t count,
-                          uint32_t samples, uint32_t seed, int32_t *out_triangles,
-                          float *out_barycentrics);
+pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, size_t count, uint32_t samples,
+                          uint32_t seed, int32_t *out_triangles, float *out_barycentrics);
 
 /*
  * Form factors from some sides to all sides: the share of the power leaving a side that lands on each.
@@ -117,12 +114,10 @@ pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, si
  *   resolution pixels along the top face, even, at least 2: 3 * resolution^2 rays per position
  *   out_rows   count * 2 * patch_count floats
  */
-pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *patches,
-                                      const int32_t *sides, size_t count, uint32_t rays,
-                                      uint32_t seed, float *out_rows);
-pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patches,
-                                   const int32_t *sides, size_t count, uint32_t resolution,
-                                   uint32_t positions, uint32_t seed, float *out_rows);
+pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *patches, const int32_t *sides,
+                                      size_t count, uint32_t rays, uint32_t seed, float *out_rows);
+pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t count,
+                                   uint32_t resolution, uint32_t positions, uint32_t seed, float *out_rows);
 
 /*
  * The share of cosine rays from each side that meet nothing within its reach: how much room it has.
@@ -131,8 +126,8 @@ pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patc
  *   first, count  the range of sides
  *   out_openness  2 * patch_count, at the sides' indices
  */
-void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *reaches, size_t first,
-                 size_t count, uint32_t rays, uint32_t seed, float *out_openness);
+void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *reaches, size_t first, size_t count,
+                 uint32_t rays, uint32_t seed, float *out_openness);
 
 /*
  * Shoot flux along rays from sides to where they land (stochastic Jacobi, Bekaert 1999).
@@ -147,8 +142,8 @@ void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *
  *   io_escaped     3: what left the scene
  */
 void pl_shoot(const pl_scene *scene, const pl_patches *patches, const uint64_t *first_rays,
-              const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count,
-              uint32_t seed, uint64_t *io_received, uint64_t *io_escaped);
+              const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count, uint32_t seed,
+              uint64_t *io_received, uint64_t *io_escaped);
 
 /*
  * Where light is wanted.
@@ -238,8 +233,8 @@ typedef struct pl_gather_rays {
     uint32_t seed;
 } pl_gather_rays;
 pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
-                    const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected,
-                    size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays);
+                    const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected, size_t count,
+                    pl_gather_rays rays, float *io_sums, uint64_t *out_rays);
 
 /*
  * Direct irradiance from the lights: shadow rays, emitters chosen by what they would give unoccluded.
@@ -251,9 +246,9 @@ pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_s
  *   out_variance   1 per receiver: variance of the irradiance's luminance, estimated
  *   out_rays       shadow rays traced
  */
-pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers,
-                    size_t first, size_t count, uint32_t samples, uint32_t seed,
-                    float *out_irradiance, float *out_variance, uint64_t *out_rays);
+pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers, size_t first,
+                    size_t count, uint32_t samples, uint32_t seed, float *out_irradiance, float *out_variance,
+                    uint64_t *out_rays);
 
 /*
  * Which texels of a lightmap are receivers, and of which point: each texel whose square of bilinear influence
@@ -286,17 +281,16 @@ pl_status pl_rasterise_texels(const float *uvs, size_t triangle_count, int32_t w
  * PL_ERR_ARGUMENT also where a chart is wider and higher than the atlas is wide.
  */
 #define PL_CHART_START 0.504
-pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t *first_triangles,
-                         size_t chart_count, double density, int32_t width, int32_t block, int32_t *out_places,
-                         int32_t *out_height);
+pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t *first_triangles, size_t chart_count,
+                         double density, int32_t width, int32_t block, int32_t *out_places, int32_t *out_height);
 
 /*
  * One level of edge-stopping smoothing over a lightmap's receivers.
  *
  *   grid            which receiver each texel is, row-major, -1 for none; spacing of texels [m], about
  *   receivers       positions and shading normals: no smoothing across creases, steps, or charts
- *   values          4 per receiver: three channels whose luminance decides, and one that goes along
- *   variances       1 per receiver, of that luminance
+ *   values          3 per receiver
+ *   variances       1 per receiver, of their luminance
  *   step            texels between the 5 x 5 taps: 1, 2, 4 ... for successive levels
  *   stops_on_value  0: geometry alone decides
  *   first_row, row_count  the range
@@ -307,8 +301,8 @@ typedef struct pl_texel_grid {
     int32_t width, height;
     float spacing;
 } pl_texel_grid;
-void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
-               const float *variances, int32_t step, int32_t stops_on_value, int32_t first_row,
-               int32_t row_count, float *out_values, float *out_variances);
+void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values, const float *variances,
+               int32_t step, int32_t stops_on_value, int32_t first_row, int32_t row_count, float *out_values,
+               float *out_variances);
 
 #endif

@@ -38,12 +38,11 @@ static bool get_array(PyObject *object, door_array *array) {
                      array->is_output ? ", writable" : "", type_name(array->format));
         return false;
     }
-    const bool fits = has_format(&array->view, array->format) &&
-                      array->view.len % (array->view.itemsize * array->columns) == 0;
+    const bool fits =
+        has_format(&array->view, array->format) && array->view.len % (array->view.itemsize * array->columns) == 0;
     if (!fits || (array->rows >= 0 && (Py_ssize_t)door_rows(array) != array->rows)) {
-        PyErr_Format(PyExc_TypeError, "%s: expected %s, %zd a row%s", array->name,
-                     type_name(array->format), array->columns,
-                     array->rows >= 0 ? ", as many rows as the arrays before it imply" : "");
+        PyErr_Format(PyExc_TypeError, "%s: expected %s, %zd a row%s", array->name, type_name(array->format),
+                     array->columns, array->rows >= 0 ? ", as many rows as the arrays before it imply" : "");
         PyBuffer_Release(&array->view);
         return false;
     }

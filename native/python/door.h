@@ -1,4 +1,5 @@
-/* What every function of the door needs: arguments as checked arrays, statuses as exceptions. SPDX-License-Identifier: GPL-3.0-or-later */
+/* What every function of the door needs: arguments as checked arrays, statuses as exceptions. SPDX-License-Identifier:
+ * GPL-3.0-or-later */
 #ifndef PATCHLIGHT_DOOR_H
 #define PATCHLIGHT_DOOR_H
 

@@ -4,8 +4,7 @@
  */
 #include "door.h"
 
-static const char EMBREE[] = "patchlight.embree", SCENE[] = "patchlight.scene",
-                  PATCHES[] = "patchlight.patches";
+static const char EMBREE[] = "patchlight.embree", SCENE[] = "patchlight.scene", PATCHES[] = "patchlight.patches";
 
 /* A capsule keeps what it was made from alive by its context. */
 static void drop_parent(PyObject *capsule) { Py_XDECREF((PyObject *)PyCapsule_GetContext(capsule)); }
@@ -82,8 +81,8 @@ static PyObject *closest_hits(PyObject *self, PyObject *args) {
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
-    pl_closest_hits(scene, arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]),
-                    arrays[2].view.buf, arrays[3].view.buf);
+    pl_closest_hits(scene, arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
+                    arrays[3].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, 4);
@@ -123,8 +122,8 @@ static PyObject *create_patches(PyObject *self, PyObject *args) {
         return NULL;
     pl_status status = PL_ERR_ARGUMENT;
     if (door_rows(&arrays[1]) == door_rows(&arrays[0]) + 1 && door_rows(&arrays[2]) > 0)
-        status = pl_patches_create(arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]),
-                                   arrays[2].view.buf, door_rows(&arrays[2]) - 1, &patches);
+        status = pl_patches_create(arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
+                                   door_rows(&arrays[2]) - 1, &patches);
     door_release(arrays, 3);
     return status == PL_OK ? PyCapsule_New(patches, PATCHES, destroy_patches) : door_result(status);
 }
@@ -144,8 +143,8 @@ static PyObject *patch_points(PyObject *self, PyObject *args) {
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
-    status = pl_patch_points(patches, arrays[0].view.buf, door_rows(&arrays[0]), samples, seed,
-                             arrays[1].view.buf, arrays[2].view.buf);
+    status = pl_patch_points(patches, arrays[0].view.buf, door_rows(&arrays[0]), samples, seed, arrays[1].view.buf,
+                             arrays[2].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, 3);
@@ -157,8 +156,7 @@ static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
     unsigned rays, seed;
     pl_status status;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOIIO", &capsules[0], &capsules[1], &objects[0], &rays, &seed,
-                          &objects[1]))
+    if (!PyArg_ParseTuple(args, "OOOIIO", &capsules[0], &capsules[1], &objects[0], &rays, &seed, &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
@@ -167,8 +165,8 @@ static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
-    status = pl_form_factors_monte_carlo(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]), rays,
-                                         seed, arrays[1].view.buf);
+    status = pl_form_factors_monte_carlo(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]), rays, seed,
+                                         arrays[1].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, 2);
@@ -180,8 +178,8 @@ static PyObject *form_factors_hemicube(PyObject *self, PyObject *args) {
     unsigned resolution, positions, seed;
     pl_status status;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOIIIO", &capsules[0], &capsules[1], &objects[0], &resolution,
-                          &positions, &seed, &objects[1]))
+    if (!PyArg_ParseTuple(args, "OOOIIIO", &capsules[0], &capsules[1], &objects[0], &resolution, &positions, &seed,
+                          &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
@@ -190,8 +188,8 @@ static PyObject *form_factors_hemicube(PyObject *self, PyObject *args) {
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
-    status = pl_form_factors_hemicube(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]),
-                                      resolution, positions, seed, arrays[1].view.buf);
+    status = pl_form_factors_hemicube(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]), resolution, positions,
+                                      seed, arrays[1].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, 2);
@@ -203,8 +201,8 @@ static PyObject *openness(PyObject *self, PyObject *args) {
     Py_ssize_t first, count;
     unsigned rays, seed;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOnnIIO", &capsules[0], &capsules[1], &objects[0], &first, &count, &rays,
-                          &seed, &objects[1]))
+    if (!PyArg_ParseTuple(args, "OOOnnIIO", &capsules[0], &capsules[1], &objects[0], &first, &count, &rays, &seed,
+                          &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
@@ -213,8 +211,7 @@ static PyObject *openness(PyObject *self, PyObject *args) {
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
-    pl_openness(scene, patches, arrays[0].view.buf, (size_t)first, (size_t)count, rays, seed,
-                arrays[1].view.buf);
+    pl_openness(scene, patches, arrays[0].view.buf, (size_t)first, (size_t)count, rays, seed, arrays[1].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, 2);
@@ -226,8 +223,8 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
     unsigned long long first, count;
     unsigned seed;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOOOKKIOO", &capsules[0], &capsules[1], &objects[0], &objects[1],
-                          &objects[2], &first, &count, &seed, &objects[3], &objects[4]))
+    if (!PyArg_ParseTuple(args, "OOOOOKKIOO", &capsules[0], &capsules[1], &objects[0], &objects[1], &objects[2], &first,
+                          &count, &seed, &objects[3], &objects[4]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
@@ -249,15 +246,17 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
 }
 
 /* The five arrays of a light table, as every function that samples lights takes them. */
-#define LIGHT_ARRAYS                                                                                        \
-    {"light_kinds", 'i', 1, -1, false, {0}}, {"light_parameters", 'f', PL_LIGHT_FLOATS, -1, false, {0}},    \
-        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 6, -1, false, {0}},             \
-        {"light_cumulative", 'f', 1, -1, false, {0}}
+#define LIGHT_ARRAYS                                                                                                   \
+    {"light_kinds", 'i', 1, -1, false, {0}}, {"light_parameters", 'f', PL_LIGHT_FLOATS, -1, false, {0}},               \
+        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 6, -1, false, {0}}, {                      \
+        "light_cumulative", 'f', 1, -1, false, {0}                                                                     \
+    }
 enum { LIGHT_ARRAY_COUNT = 5, RECEIVER_ARRAY_COUNT = 3 };
 
-#define RECEIVER_ARRAYS                                                                                     \
-    {"positions", 'd', 3, -1, false, {0}}, {"normals", 'f', 3, -1, false, {0}},                             \
-        {"triangle_sides", 'i', 1, -1, false, {0}}
+#define RECEIVER_ARRAYS                                                                                                \
+    {"positions", 'd', 3, -1, false, {0}}, {"normals", 'f', 3, -1, false, {0}}, {                                      \
+        "triangle_sides", 'i', 1, -1, false, {0}                                                                       \
+    }
 
 static pl_lights lights_of(const door_array *arrays) {
     return (pl_lights){arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
@@ -280,16 +279,22 @@ static bool unpack(PyObject *tuple, Py_ssize_t count, PyObject **out_objects) {
 }
 
 static PyObject *gather(PyObject *self, PyObject *args) {
-    enum { FIELDS = 6, LIGHTS = FIELDS, RECEIVERS = LIGHTS + LIGHT_ARRAY_COUNT,
-           SELECTED = RECEIVERS + RECEIVER_ARRAY_COUNT, SUMS, ARRAYS };
+    enum {
+        FIELDS = 6,
+        LIGHTS = FIELDS,
+        RECEIVERS = LIGHTS + LIGHT_ARRAY_COUNT,
+        SELECTED = RECEIVERS + RECEIVER_ARRAY_COUNT,
+        SUMS,
+        ARRAYS
+    };
     PyObject *capsules[2], *solution_arrays, *light_arrays, *receiver_arrays, *objects[ARRAYS];
     pl_gather_rays rays;
     uint64_t traced = 0;
     pl_status status;
     (void)self;
     if (!PyArg_ParseTuple(args, "OOOOOOIIIIO", &capsules[0], &capsules[1], &solution_arrays, &light_arrays,
-                          &receiver_arrays, &objects[SELECTED], &rays.replicates, &rays.first, &rays.count,
-                          &rays.seed, &objects[SUMS]))
+                          &receiver_arrays, &objects[SELECTED], &rays.replicates, &rays.first, &rays.count, &rays.seed,
+                          &objects[SUMS]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
@@ -305,8 +310,7 @@ static PyObject *gather(PyObject *self, PyObject *args) {
                            {"io_sums", 'f', 3, -1, true, {0}}};
     if (!patches || !unpack(solution_arrays, FIELDS, objects) ||
         !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects + LIGHTS) ||
-        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) ||
-        !door_arrays(objects, arrays, ARRAYS))
+        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
     const float *sky = arrays[5].view.buf;
     const pl_solution solution = {arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf,
@@ -316,7 +320,7 @@ static PyObject *gather(PyObject *self, PyObject *args) {
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_gather(scene, patches, &solution, &lights, &receivers, arrays[SELECTED].view.buf,
-              door_rows(&arrays[SELECTED]), rays, arrays[SUMS].view.buf, &traced);
+                       door_rows(&arrays[SELECTED]), rays, arrays[SUMS].view.buf, &traced);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, ARRAYS);
@@ -331,8 +335,8 @@ static PyObject *direct(PyObject *self, PyObject *args) {
     uint64_t rays = 0;
     pl_status status;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOnnIIOO", &capsule, &light_arrays, &receiver_arrays, &first, &count,
-                          &samples, &seed, &objects[IRRADIANCE], &objects[VARIANCE]))
+    if (!PyArg_ParseTuple(args, "OOOnnIIOO", &capsule, &light_arrays, &receiver_arrays, &first, &count, &samples, &seed,
+                          &objects[IRRADIANCE], &objects[VARIANCE]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
     door_array arrays[] = {LIGHT_ARRAYS,
@@ -340,8 +344,7 @@ static PyObject *direct(PyObject *self, PyObject *args) {
                            {"out_irradiance", 'f', 3, -1, true, {0}},
                            {"out_variance", 'f', 1, -1, true, {0}}};
     if (!scene || !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects) ||
-        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) ||
-        !door_arrays(objects, arrays, ARRAYS))
+        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
     const pl_lights lights = lights_of(arrays);
     const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
@@ -363,14 +366,13 @@ static PyObject *smooth(PyObject *self, PyObject *args) {
     (void)self;
     if (!PyArg_ParseTuple(args, "OiifOOOiiiiOO", &objects[RECEIVER_ARRAY_COUNT], &grid.width, &grid.height,
                           &grid.spacing, &receiver_arrays, &objects[VALUES], &objects[VARIANCES], &step,
-                          &stops_on_value, &first_row, &row_count, &objects[OUT_VALUES],
-                          &objects[OUT_VARIANCES]))
+                          &stops_on_value, &first_row, &row_count, &objects[OUT_VALUES], &objects[OUT_VARIANCES]))
         return NULL;
     door_array arrays[] = {RECEIVER_ARRAYS,
                            {"grid", 'i', 1, (Py_ssize_t)grid.width * grid.height, false, {0}},
-                           {"values", 'f', 4, -1, false, {0}},
+                           {"values", 'f', 3, -1, false, {0}},
                            {"variances", 'f', 1, -1, false, {0}},
-                           {"out_values", 'f', 4, -1, true, {0}},
+                           {"out_values", 'f', 3, -1, true, {0}},
                            {"out_variances", 'f', 1, -1, true, {0}}};
     if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
@@ -378,8 +380,8 @@ static PyObject *smooth(PyObject *self, PyObject *args) {
     grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
 
     Py_BEGIN_ALLOW_THREADS
-    pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value,
-              first_row, row_count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
+    pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value, first_row,
+              row_count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, ARRAYS);
@@ -440,19 +442,16 @@ static PyMethodDef methods[] = {
     {"create_scene", create_scene, METH_VARARGS,
      "create_scene(embree, vertices, triangles, transmittance or None) -> scene"},
     {"scene_centre", scene_centre, METH_O, "scene_centre(scene) -> (x, y, z)"},
-    {"closest_hits", closest_hits, METH_VARARGS,
-     "closest_hits(scene, origins, directions, out_triangles, out_hits)"},
+    {"closest_hits", closest_hits, METH_VARARGS, "closest_hits(scene, origins, directions, out_triangles, out_hits)"},
     {"occluded", occluded, METH_VARARGS, "occluded(scene, points_from, points_to, out_occluded)"},
-    {"create_patches", create_patches, METH_VARARGS,
-     "create_patches(apexes, first_rows, first_patches) -> patches"},
+    {"create_patches", create_patches, METH_VARARGS, "create_patches(apexes, first_rows, first_patches) -> patches"},
     {"patch_points", patch_points, METH_VARARGS,
      "patch_points(layout, patches, samples, seed, out_triangles, out_barycentrics)"},
     {"form_factors_monte_carlo", form_factors_monte_carlo, METH_VARARGS,
      "form_factors_monte_carlo(scene, patches, sides, rays, seed, out_rows)"},
     {"form_factors_hemicube", form_factors_hemicube, METH_VARARGS,
      "form_factors_hemicube(scene, patches, sides, resolution, positions, seed, out_rows)"},
-    {"openness", openness, METH_VARARGS,
-     "openness(scene, patches, reaches, first, count, rays, seed, out_openness)"},
+    {"openness", openness, METH_VARARGS, "openness(scene, patches, reaches, first, count, rays, seed, out_openness)"},
     {"shoot", shoot, METH_VARARGS,
      "shoot(scene, patches, first_rays, first_samples, ray_flux, first, count, seed, io_received, "
      "io_escaped)"},

@@ -38,9 +38,8 @@ static size_t choose_light(const float *importances, size_t count, float total, 
     return chosen;
 }
 
-bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_light_balls *balls,
-                     float *importances, vec3 origin, vec3 normal, const float random[3],
-                     float out_rgb[3]) {
+bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_light_balls *balls, float *importances,
+                     vec3 origin, vec3 normal, const float random[3], float out_rgb[3]) {
     pl_light_sample sample;
     out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
     const float total = light_importances(lights, balls, origin, normal, importances);
@@ -58,16 +57,14 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
 }
 
 /* A ray of a smooth receiver may have to leave through its own triangle, which the smooth surface is not. */
-static bool is_hidden_from_smooth(const pl_scene *scene, const pl_receiver_frame *frame, vec3 direction,
-                                  float far) {
+static bool is_hidden_from_smooth(const pl_scene *scene, const pl_receiver_frame *frame, vec3 direction, float far) {
     const pl_hit hit = closest_hit(scene, frame->origin, direction, 0);
     if (hit.triangle < 0 || hit.distance >= far)
         return false;
     if (hit.triangle != frame->triangle)
         return true;
     const vec3 through = vec3_mul_add(direction, hit.distance, frame->origin);
-    return is_occluded(scene,
-                       point_off_triangle(scene, frame->triangle, through, vec3_scale(frame->geometric, -1)),
+    return is_occluded(scene, point_off_triangle(scene, frame->triangle, through, vec3_scale(frame->geometric, -1)),
                        direction, far - hit.distance);
 }
 
@@ -75,8 +72,7 @@ static bool is_hidden_from_smooth(const pl_scene *scene, const pl_receiver_frame
 static bool shine(direct_job *job, const pl_receiver_frame *frame, pl_light_sample *io_sample) {
     const bool below = vec3_dot(frame->geometric, io_sample->direction) <= 0;
     ++job->rays;
-    if (below ? !frame->is_smooth ||
-                    is_hidden_from_smooth(job->scene, frame, io_sample->direction, io_sample->far)
+    if (below ? !frame->is_smooth || is_hidden_from_smooth(job->scene, frame, io_sample->direction, io_sample->far)
               : is_occluded(job->scene, frame->origin, io_sample->direction, io_sample->far))
         return false;
     transmit(job->scene, frame->origin, io_sample->direction, io_sample->far, io_sample->irradiance);
@@ -88,13 +84,13 @@ typedef struct light_sums {
     uint32_t visible, taken;
 } light_sums;
 
-static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed,
-                         uint32_t first, uint32_t end, light_sums *io_sums) {
+static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed, uint32_t first,
+                         uint32_t end, light_sums *io_sums) {
     for (uint32_t k = first; k < end; ++k) {
         pl_light_sample sample;
         ++io_sums->taken;
-        if (!light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 0, seed),
-                          sobol(k, 1, seed), &sample))
+        if (!light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 0, seed), sobol(k, 1, seed),
+                          &sample))
             continue;
         for (int c = 0; c < 3; ++c)
             io_sums->all[c] += sample.irradiance[c];
@@ -107,8 +103,8 @@ static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t
 }
 
 /* The light that arrives, from one replicate's sums. */
-static void estimate(const direct_job *job, const pl_receiver_frame *frame, size_t light,
-                     const light_sums *sums, float out_rgb[3]) {
+static void estimate(const direct_job *job, const pl_receiver_frame *frame, size_t light, const light_sums *sums,
+                     float out_rgb[3]) {
     float exact[3];
     const bool is_exact = light_exact(job->lights, light, frame->origin, frame->shading, exact);
     for (int c = 0; c < 3; ++c) {
@@ -121,8 +117,8 @@ static void estimate(const direct_job *job, const pl_receiver_frame *frame, size
 }
 
 /* A light of its own rays: few where it is all seen or all hidden, the full number in its penumbra. */
-static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, size_t light,
-                             uint32_t samples, uint32_t seed, float io_totals[REPLICATES][3]) {
+static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t samples,
+                             uint32_t seed, float io_totals[REPLICATES][3]) {
     if (light_is_sharp(job->lights, light)) {
         pl_light_sample sample;
         if (light_sample(job->lights, light, frame->origin, frame->shading, 0, 0, &sample) &&
@@ -164,8 +160,8 @@ static void add_weak_lights(direct_job *job, const pl_receiver_frame *frame, flo
         passed += importance;
         for (; next < passed && k < samples; next += step, ++k) {
             pl_light_sample sample;
-            if (!light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 1, seed),
-                              sobol(k, 2, seed), &sample) ||
+            if (!light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 1, seed), sobol(k, 2, seed),
+                              &sample) ||
                 !shine(job, frame, &sample))
                 continue;
             for (int c = 0; c < 3; ++c)
@@ -176,14 +172,13 @@ static void add_weak_lights(direct_job *job, const pl_receiver_frame *frame, flo
 
 static uint32_t share_of(uint32_t samples, float part, float total) {
     const float share = ceilf((float)samples * part / total);
-    return share < 1 ? 1 : share > (float)samples ? samples : (uint32_t)share;
+    return share<1 ? 1 : share>(float) samples ? samples : (uint32_t)share;
 }
 
-static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint32_t seed,
-                           float out_rgb[3], float *out_variance) {
+static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint32_t seed, float out_rgb[3],
+                           float *out_variance) {
     float totals[REPLICATES][3] = {{0}};
-    const float total = light_importances(job->lights, &job->balls, frame->origin, frame->shading,
-                                          job->importances);
+    const float total = light_importances(job->lights, &job->balls, frame->origin, frame->shading, job->importances);
     const float threshold = total / (2 * (float)job->samples);
     float weak = 0;
 
@@ -207,9 +202,9 @@ static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint
     *out_variance = 0.25f * difference * difference;
 }
 
-pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers,
-                    size_t first, size_t count, uint32_t samples, uint32_t seed,
-                    float *out_irradiance, float *out_variance, uint64_t *out_rays) {
+pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers, size_t first,
+                    size_t count, uint32_t samples, uint32_t seed, float *out_irradiance, float *out_variance,
+                    uint64_t *out_rays) {
     direct_job job = {.scene = scene, .lights = lights, .samples = samples ? samples : 1, .seed = seed};
     job.importances = malloc(sizeof(float) * (lights->count + 1));
     if (!job.importances || !light_balls_create(lights, &job.balls)) {
@@ -218,8 +213,7 @@ pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_rec
     }
     for (size_t i = first; i < first + count; ++i) {
         const pl_receiver_frame frame = receiver_frame(scene, receivers, i);
-        light_receiver(&job, &frame, hash_pair(seed, (uint32_t)i), out_irradiance + 3 * i,
-                       out_variance + i);
+        light_receiver(&job, &frame, hash_pair(seed, (uint32_t)i), out_irradiance + 3 * i, out_variance + i);
     }
     *out_rays = job.rays;
     light_balls_destroy(&job.balls);

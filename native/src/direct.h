@@ -10,8 +10,7 @@
  * would give, one shadow ray. Three random numbers in [0, 1); `importances` is room for one number a light.
  * Returns whether a ray was traced.
  */
-bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_light_balls *balls,
-                     float *importances, vec3 origin, vec3 normal, const float random[3],
-                     float out_rgb[3]);
+bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_light_balls *balls, float *importances,
+                     vec3 origin, vec3 normal, const float random[3], float out_rgb[3]);
 
 #endif

@@ -9,12 +9,9 @@
 #include <windows.h>
 
 static void *open_library(const char *path) {
-    return (void *)LoadLibraryExA(
-        path, NULL, LOAD_LIBRARY_SEARCH_DLL_LOAD_DIR | LOAD_LIBRARY_SEARCH_DEFAULT_DIRS);
+    return (void *)LoadLibraryExA(path, NULL, LOAD_LIBRARY_SEARCH_DLL_LOAD_DIR | LOAD_LIBRARY_SEARCH_DEFAULT_DIRS);
 }
-static void *find_symbol(void *library, const char *name) {
-    return (void *)GetProcAddress((HMODULE)library, name);
-}
+static void *find_symbol(void *library, const char *name) { return (void *)GetProcAddress((HMODULE)library, name); }
 #else
 #include <dlfcn.h>
 
@@ -33,8 +30,7 @@ static int load_functions(pl_embree *embree) {
     return load(embree, "rtcNewDevice", &embree->new_device) &&
            load(embree, "rtcReleaseDevice", &embree->release_device) &&
            load(embree, "rtcGetDeviceProperty", &embree->device_property) &&
-           load(embree, "rtcNewScene", &embree->new_scene) &&
-           load(embree, "rtcReleaseScene", &embree->release_scene) &&
+           load(embree, "rtcNewScene", &embree->new_scene) && load(embree, "rtcReleaseScene", &embree->release_scene) &&
            load(embree, "rtcSetSceneFlags", &embree->set_scene_flags) &&
            load(embree, "rtcSetSceneBuildQuality", &embree->set_scene_quality) &&
            load(embree, "rtcCommitScene", &embree->commit_scene) &&
@@ -43,8 +39,7 @@ static int load_functions(pl_embree *embree) {
            load(embree, "rtcSetNewGeometryBuffer", &embree->new_buffer) &&
            load(embree, "rtcCommitGeometry", &embree->commit_geometry) &&
            load(embree, "rtcAttachGeometry", &embree->attach_geometry) &&
-           load(embree, "rtcIntersect1", &embree->intersect) &&
-           load(embree, "rtcOccluded1", &embree->occluded);
+           load(embree, "rtcIntersect1", &embree->intersect) && load(embree, "rtcOccluded1", &embree->occluded);
 }
 
 /* The hand-made declarations hold if one known ray gives one known hit and writes nothing behind it. */
@@ -53,8 +48,7 @@ static int layout_is_as_declared(const pl_embree *embree) {
     static const uint32_t indices[3] = {0, 1, 2};
     RTCScene scene = embree->new_scene(embree->device);
     RTCGeometry geometry = embree->new_geometry(embree->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    void *vertex_buffer =
-        embree->new_buffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 3);
+    void *vertex_buffer = embree->new_buffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 3);
     void *index_buffer = embree->new_buffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, 1);
     if (vertex_buffer && index_buffer) {
         memcpy(vertex_buffer, corners, sizeof corners);
@@ -77,8 +71,7 @@ static int layout_is_as_declared(const pl_embree *embree) {
     embree->intersect(scene, &rayhit, NULL);
     embree->release_scene(scene);
     return vertex_buffer && index_buffer && rayhit.ray.tfar == 1.0f && rayhit.hit.primID == 0 &&
-           rayhit.hit.u == 0.25f && rayhit.hit.v == 0.5f && rayhit.hit.Ng_z > 0 &&
-           rayhit.hit.padding[0] == 0x12345678u;
+           rayhit.hit.u == 0.25f && rayhit.hit.v == 0.5f && rayhit.hit.Ng_z > 0 && rayhit.hit.padding[0] == 0x12345678u;
 }
 
 pl_status pl_embree_open(const char *path, pl_embree **out_embree) {
@@ -88,8 +81,7 @@ pl_status pl_embree_open(const char *path, pl_embree **out_embree) {
     embree->library = open_library(path);
     if (embree->library && load_functions(embree)) {
         embree->device = embree->new_device(NULL);
-        if (embree->device &&
-            embree->device_property(embree->device, RTC_DEVICE_PROPERTY_VERSION) / 100 == 404 &&
+        if (embree->device && embree->device_property(embree->device, RTC_DEVICE_PROPERTY_VERSION) / 100 == 404 &&
             layout_is_as_declared(embree)) {
             *out_embree = embree;
             return PL_OK;

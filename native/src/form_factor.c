@@ -9,8 +9,8 @@
 #include <string.h>
 
 /* Add a ray's share to the entry of what it hits. */
-static void deposit(const pl_scene *scene, const pl_patches *patches, vec3 origin, vec3 direction,
-                    float share, float *row) {
+static void deposit(const pl_scene *scene, const pl_patches *patches, vec3 origin, vec3 direction, float share,
+                    float *row) {
     const pl_hit hit = closest_hit(scene, origin, direction, 0);
     if (hit.triangle >= 0)
         row[hit_side(patches, &hit)] += share;
@@ -23,9 +23,8 @@ static bool sides_are_in_range(const pl_patches *patches, const int32_t *sides, 
     return true;
 }
 
-pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *patches,
-                                      const int32_t *sides, size_t count, uint32_t rays,
-                                      uint32_t seed, float *out_rows) {
+pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *patches, const int32_t *sides,
+                                      size_t count, uint32_t rays, uint32_t seed, float *out_rows) {
     const size_t side_count = 2 * patches->patch_count;
     if (rays == 0 || !sides_are_in_range(patches, sides, count))
         return PL_ERR_ARGUMENT;
@@ -35,10 +34,10 @@ pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *p
         const pl_side_frame frame = side_frame(scene, patches, side);
         const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
         for (uint32_t k = 0; k < rays; ++k) {
-            const vec3 origin = side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed),
-                                            sobol(k, 1, side_seed));
-            const vec3 direction = cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed),
-                                                    frame.u, frame.v, frame.normal);
+            const vec3 origin =
+                side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
+            const vec3 direction =
+                cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), frame.u, frame.v, frame.normal);
             deposit(scene, patches, origin, direction, 1 / (float)rays, out_rows + i * side_count);
         }
     }
@@ -84,9 +83,8 @@ static float hemicube_sum(uint32_t resolution) {
     return (float)sum;
 }
 
-static void hemicube_at(const pl_scene *scene, const pl_patches *patches, vec3 origin,
-                        const pl_side_frame *frame, float turn, uint32_t resolution, float share,
-                        float *row) {
+static void hemicube_at(const pl_scene *scene, const pl_patches *patches, vec3 origin, const pl_side_frame *frame,
+                        float turn, uint32_t resolution, float share, float *row) {
     const float cosine = cosf(turn), sine = sinf(turn);
     const vec3 u = vec3_mul_add(frame->u, cosine, vec3_scale(frame->v, sine));
     const vec3 v = vec3_mul_add(frame->v, cosine, vec3_scale(frame->u, -sine));
@@ -98,9 +96,8 @@ static void hemicube_at(const pl_scene *scene, const pl_patches *patches, vec3 o
     }
 }
 
-pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patches,
-                                   const int32_t *sides, size_t count, uint32_t resolution,
-                                   uint32_t positions, uint32_t seed, float *out_rows) {
+pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t count,
+                                   uint32_t resolution, uint32_t positions, uint32_t seed, float *out_rows) {
     const size_t side_count = 2 * patches->patch_count;
     if (resolution < 2 || resolution % 2 || positions == 0 || !sides_are_in_range(patches, sides, count))
         return PL_ERR_ARGUMENT;
@@ -111,10 +108,10 @@ pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patc
         const pl_side_frame frame = side_frame(scene, patches, side);
         const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
         for (uint32_t k = 0; k < positions; ++k) {
-            const vec3 origin = side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed),
-                                            sobol(k, 1, side_seed));
-            hemicube_at(scene, patches, origin, &frame, 2 * PL_PI * sobol(k, 2, side_seed), resolution,
-                        share, out_rows + i * side_count);
+            const vec3 origin =
+                side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
+            hemicube_at(scene, patches, origin, &frame, 2 * PL_PI * sobol(k, 2, side_seed), resolution, share,
+                        out_rows + i * side_count);
         }
     }
     return PL_OK;

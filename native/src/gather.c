@@ -11,7 +11,7 @@
 
 #include <stdlib.h>
 
-enum { MOST_STEPS = 16 }; /* of a ray caught between surfaces that touch */
+enum { MOST_STEPS = 6 }; /* of a ray caught between surfaces that touch; then a mean has to do */
 
 typedef struct gather_job {
     const pl_scene *scene;
@@ -57,8 +57,8 @@ static vec3 hit_normal(const pl_scene *scene, const pl_hit *hit, size_t side) {
 }
 
 /* Direct light that a side reflects at the point hit: its mean, or sampled anew where it is mixed. */
-static void reflect_direct(gather_job *job, const pl_hit *hit, size_t side, ray_random *random,
-                           const float *weight, float *io_sum) {
+static void reflect_direct(gather_job *job, const pl_hit *hit, size_t side, ray_random *random, const float *weight,
+                           float *io_sum) {
     const pl_solution *solution = job->solution;
     if (solution->kinds[side] != PL_SIDE_MIXED) {
         add(io_sum, solution->direct + 3 * side, weight);
@@ -89,12 +89,11 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             add(io_sum, solution->sky, weight);
             return;
         }
-        const size_t side = step == 0 && frame->is_smooth
-                                ? smooth_side(job->patches, frame, direction, &hit)
-                                : hit_side(job->patches, &hit);
+        const size_t side = step == 0 && frame->is_smooth ? smooth_side(job->patches, frame, direction, &hit)
+                                                          : hit_side(job->patches, &hit);
         if (step == 0 && solution->kinds[side] == PL_SIDE_LIGHT)
             return;
-        const bool is_far = hit.distance >= solution->reaches[side];
+        const bool is_far = hit.distance >= solution->reaches[side] || step == MOST_STEPS - 1;
         if (is_far && solution->kinds[side] != PL_SIDE_MIXED) {
             add(io_sum, solution->radiosity + 3 * side, weight);
             return;
@@ -119,8 +118,8 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
 }
 
 pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
-               const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected,
-               size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
+                    const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected, size_t count,
+                    pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
     gather_job job = {.scene = scene, .patches = patches, .solution = solution, .lights = lights};
     job.importances = malloc(sizeof(float) * (lights->count + 1));
     if (!job.importances || !light_balls_create(lights, &job.balls)) {
@@ -135,8 +134,7 @@ pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_s
             const uint32_t seed = hash_pair(hash_pair(rays.seed, replicate), selected[i]);
             float *sum = io_sums + 3 * ((size_t)selected[i] * rays.replicates + replicate);
             for (uint32_t k = rays.first; k < rays.first + rays.count; ++k) {
-                const vec3 direction = cosine_direction(sobol(k, 0, seed), sobol(k, 1, seed), u, v,
-                                                        frame.shading);
+                const vec3 direction = cosine_direction(sobol(k, 0, seed), sobol(k, 1, seed), u, v, frame.shading);
                 gather_ray(&job, &frame, direction, (ray_random){hash_pair(seed, k), 0}, sum);
             }
         }

@@ -36,9 +36,7 @@ static area_light area_of(const float *p) {
     return (area_light){vec3_from(p), vec3_from(p + 3), vec3_from(p + 6), vec3_from(p + 9), p[12], p[13]};
 }
 
-static mesh_light mesh_of(const float *p) {
-    return (mesh_light){vec3_from(p), p[3], p[4], (size_t)p[5], (size_t)p[6]};
-}
+static mesh_light mesh_of(const float *p) { return (mesh_light){vec3_from(p), p[3], p[4], (size_t)p[5], (size_t)p[6]}; }
 
 static const float *parameters_of(const pl_lights *lights, size_t light) {
     return lights->parameters + PL_LIGHT_FLOATS * light;
@@ -71,8 +69,8 @@ static float cone_importance(const point_light *light, vec3 point) {
 }
 
 /* A uniform direction in the cone that a sphere fills, or a point of the disc that faces the receiver. */
-static bool sample_sphere(const point_light *light, vec3 to, float distance, float x, float y,
-                          vec3 *out_direction, float *out_far, float *out_solid_angle) {
+static bool sample_sphere(const point_light *light, vec3 to, float distance, float x, float y, vec3 *out_direction,
+                          float *out_far, float *out_solid_angle) {
     vec3 u, v;
     const vec3 axis = vec3_scale(to, 1 / distance);
     const float sine = light->radius / distance;
@@ -87,14 +85,12 @@ static bool sample_sphere(const point_light *light, vec3 to, float distance, flo
     const float side = sqrtf(fmaxf(0, one_minus_cos * (2 - one_minus_cos)));
     const vec3 across = vec3_mul_add(u, side * cosf(angle), vec3_scale(v, side * sinf(angle)));
     *out_direction = vec3_mul_add(axis, cosine, across);
-    *out_far = distance * cosine - sqrtf(fmaxf(0, light->radius * light->radius -
-                                                      distance * distance * side * side));
+    *out_far = distance * cosine - sqrtf(fmaxf(0, light->radius * light->radius - distance * distance * side * side));
     *out_solid_angle = 2 * PL_PI * one_minus_cos_max;
     return true;
 }
 
-static bool sample_point_light(const float *p, vec3 point, vec3 normal, float x, float y,
-                               pl_light_sample *out) {
+static bool sample_point_light(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out) {
     const point_light light = point_of(p);
     const vec3 to = vec3_sub(light.position, point);
     const float distance = vec3_length(to);
@@ -163,8 +159,8 @@ static float spread_share(const area_light *light, float cosine) {
 static void area_corners(const area_light *light, vec3 out_corners[4]) {
     static const float signs[4][2] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
     for (int k = 0; k < 4; ++k)
-        out_corners[k] = vec3_mul_add(light->axis_u, signs[k][0],
-                                      vec3_mul_add(light->axis_v, signs[k][1], light->centre));
+        out_corners[k] =
+            vec3_mul_add(light->axis_u, signs[k][0], vec3_mul_add(light->axis_v, signs[k][1], light->centre));
 }
 
 static bool area_faces(const area_light *light, vec3 point) {
@@ -182,8 +178,7 @@ static float area_of_lamp(const area_light *light) {
 }
 
 /* Near an area lamp the closed form; from far away, it says no more than the square law at fifty times the cost. */
-static float area_importance(const area_light *light, const float *radiance, vec3 point, vec3 normal,
-                             float ball) {
+static float area_importance(const area_light *light, const float *radiance, vec3 point, vec3 normal, float ball) {
     if (!area_faces(light, point))
         return 0;
     const float reach = 4 * vec3_length(vec3_add(light->axis_u, light->axis_v));
@@ -225,14 +220,12 @@ static const float *radiance_towards(const pl_lights *lights, size_t triangle, v
     return lights->triangle_radiances + 6 * triangle + (is_front ? 0 : 3);
 }
 
-static void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 point, vec3 normal,
-                       float out_rgb[3]) {
+static void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 point, vec3 normal, float out_rgb[3]) {
     out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
     for (size_t t = light->first; t < light->first + light->count; ++t) {
         const float *c = lights->triangle_corners + 9 * t;
         const vec3 corners[3] = {vec3_from(c), vec3_from(c + 3), vec3_from(c + 6)};
-        const vec3 twice_area =
-            vec3_cross(vec3_sub(corners[1], corners[0]), vec3_sub(corners[2], corners[0]));
+        const vec3 twice_area = vec3_cross(vec3_sub(corners[1], corners[0]), vec3_sub(corners[2], corners[0]));
         const float *radiance = radiance_towards(lights, t, corners[0], twice_area, point);
         if (luminance(radiance) <= 0)
             continue;
@@ -253,8 +246,7 @@ static float mesh_importance(const pl_lights *lights, const float *p, vec3 point
 }
 
 /* The triangle whose share of the cumulative sums x falls into; x becomes its place in that share. */
-static size_t choose_triangle(const pl_lights *lights, const mesh_light *light, float *io_x,
-                              float *out_chance) {
+static size_t choose_triangle(const pl_lights *lights, const mesh_light *light, float *io_x, float *out_chance) {
     size_t low = light->first, high = light->first + light->count;
     while (high - low > 1) {
         const size_t middle = low + (high - low) / 2;
@@ -324,8 +316,7 @@ static void describe_ball(const pl_lights *lights, size_t light, pl_light_balls 
         const area_light lamp = area_of(p);
         io_balls->radius[light] = vec3_length(vec3_add(lamp.axis_u, lamp.axis_v));
         /* a narrow beam is concentrated on its axis */
-        io_balls->strength[light] =
-            luminance(p + 3) * area_of_lamp(&lamp) * fmaxf(spread_share(&lamp, 1), 1);
+        io_balls->strength[light] = luminance(p + 3) * area_of_lamp(&lamp) * fmaxf(spread_share(&lamp, 1), 1);
         break;
     }
     case PL_LIGHT_MESH:

@@ -13,9 +13,7 @@ typedef struct pl_light_sample {
     float irradiance[3]; /* one-sample estimate of what arrives, unoccluded */
 } pl_light_sample;
 
-static inline float luminance(const float rgb[3]) {
-    return 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
-}
+static inline float luminance(const float rgb[3]) { return 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2]; }
 
 /* A light that one ray decides: a point or a parallel sun. */
 bool light_is_sharp(const pl_lights *lights, size_t light);

@@ -37,8 +37,7 @@ static int32_t *owners(const int32_t *offsets, size_t count) {
 }
 
 pl_status pl_patches_create(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
-                            const int32_t *first_patches, size_t row_count,
-                            pl_patches **out_patches) {
+                            const int32_t *first_patches, size_t row_count, pl_patches **out_patches) {
     if (!layout_is_valid(apexes, first_rows, triangle_count, first_patches, row_count))
         return PL_ERR_ARGUMENT;
     pl_patches *patches = calloc(1, sizeof *patches);
@@ -104,8 +103,7 @@ pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, si
         const size_t patch = (size_t)selected[i];
         const uint32_t patch_seed = hash_pair(seed, (uint32_t)patch);
         for (uint32_t k = 0; k < samples; ++k) {
-            const pl_barycentric b =
-                point_in_patch(patches, patch, sobol(k, 0, patch_seed), sobol(k, 1, patch_seed));
+            const pl_barycentric b = point_in_patch(patches, patch, sobol(k, 0, patch_seed), sobol(k, 1, patch_seed));
             const size_t at = i * samples + k;
             out_triangles[at] = patch_triangle(patches, patch);
             out_barycentrics[3 * at] = 1 - b.weight_1 - b.weight_2;

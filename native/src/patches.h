@@ -64,8 +64,8 @@ static inline pl_side_frame side_frame(const pl_scene *scene, const pl_patches *
 static inline vec3 side_origin(const pl_scene *scene, const pl_patches *patches, size_t side,
                                const pl_side_frame *frame, float x, float y) {
     const pl_barycentric b = point_in_patch(patches, side / 2, x, y);
-    return point_off_triangle(scene, frame->triangle,
-                              scene_point(scene, frame->triangle, b.weight_1, b.weight_2), frame->normal);
+    return point_off_triangle(scene, frame->triangle, scene_point(scene, frame->triangle, b.weight_1, b.weight_2),
+                              frame->normal);
 }
 
 #endif

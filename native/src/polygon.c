@@ -26,8 +26,7 @@ static int clip_to_horizon(const dvec3 *corners, int count, dvec3 normal, dvec3 
             out_clipped[clipped++] = a;
         if ((height_a < 0) != (height_b < 0)) {
             const double t = height_a / (height_a - height_b);
-            out_clipped[clipped++] =
-                (dvec3){a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), a.z + t * (b.z - a.z)};
+            out_clipped[clipped++] = (dvec3){a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), a.z + t * (b.z - a.z)};
         }
     }
     return clipped;

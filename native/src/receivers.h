@@ -13,8 +13,7 @@ typedef struct pl_receiver_frame {
     bool is_smooth;
 } pl_receiver_frame;
 
-static inline pl_receiver_frame receiver_frame(const pl_scene *scene, const pl_receivers *receivers,
-                                               size_t index) {
+static inline pl_receiver_frame receiver_frame(const pl_scene *scene, const pl_receivers *receivers, size_t index) {
     const double *p = receivers->positions + 3 * index;
     pl_receiver_frame frame = {.triangle = receivers->triangle_sides[index] / 2,
                                .side = receivers->triangle_sides[index] & 1};

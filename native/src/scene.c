@@ -47,8 +47,8 @@ static pl_status build_layer(pl_scene *scene, bool clear, pl_layer *out_layer) {
         geometry = embree->new_geometry(embree->device, RTC_GEOMETRY_TYPE_TRIANGLE);
         float *vertex_buffer = embree->new_buffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                                   3 * sizeof(float), scene->vertex_count);
-        uint32_t *index_buffer = embree->new_buffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                    3 * sizeof(uint32_t), count);
+        uint32_t *index_buffer =
+            embree->new_buffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), count);
         if (!vertex_buffer || !index_buffer)
             goto done;
         memcpy(vertex_buffer, scene->vertices, 3 * sizeof(float) * scene->vertex_count);
@@ -85,8 +85,8 @@ static void *copy_of(const void *bytes, size_t size) {
 }
 
 pl_status pl_scene_create(const pl_embree *embree, const double *vertices, size_t vertex_count,
-                          const int32_t *triangles, size_t triangle_count,
-                          const float *transmittance, pl_scene **out_scene) {
+                          const int32_t *triangles, size_t triangle_count, const float *transmittance,
+                          pl_scene **out_scene) {
     if (!indices_are_in_range(triangles, triangle_count, vertex_count))
         return PL_ERR_ARGUMENT;
     pl_status status = PL_ERR_MEMORY;
@@ -136,21 +136,26 @@ void pl_scene_centre(const pl_scene *scene, double out_centre[3]) {
 }
 
 static RTCRay ray_along(vec3 origin, vec3 direction, float near, float far) {
-    return (RTCRay){.org_x = origin.x, .org_y = origin.y, .org_z = origin.z, .tnear = near,
-                    .dir_x = direction.x, .dir_y = direction.y, .dir_z = direction.z, .tfar = far,
+    return (RTCRay){.org_x = origin.x,
+                    .org_y = origin.y,
+                    .org_z = origin.z,
+                    .tnear = near,
+                    .dir_x = direction.x,
+                    .dir_y = direction.y,
+                    .dir_z = direction.z,
+                    .tfar = far,
                     .mask = ~0u};
 }
 
-static pl_hit layer_hit(const pl_scene *scene, const pl_layer *layer, vec3 origin, vec3 direction,
-                        float near, float far) {
+static pl_hit layer_hit(const pl_scene *scene, const pl_layer *layer, vec3 origin, vec3 direction, float near,
+                        float far) {
     RTCRayHit rayhit;
     rayhit.ray = ray_along(origin, direction, near, far);
     rayhit.hit.geomID = RTC_INVALID_ID;
     scene->embree->intersect(layer->bvh, &rayhit, NULL);
     if (rayhit.hit.geomID == RTC_INVALID_ID)
         return (pl_hit){.triangle = -1, .distance = far};
-    const float facing = rayhit.hit.Ng_x * direction.x + rayhit.hit.Ng_y * direction.y +
-                         rayhit.hit.Ng_z * direction.z;
+    const float facing = rayhit.hit.Ng_x * direction.x + rayhit.hit.Ng_y * direction.y + rayhit.hit.Ng_z * direction.z;
     return (pl_hit){.triangle = layer->triangles[rayhit.hit.primID],
                     .u = rayhit.hit.u,
                     .v = rayhit.hit.v,
@@ -184,15 +189,13 @@ void transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, flo
 }
 
 static vec3 recentred(const pl_scene *scene, const double *p) {
-    return (vec3){(float)(p[0] - scene->centre[0]), (float)(p[1] - scene->centre[1]),
-                  (float)(p[2] - scene->centre[2])};
+    return (vec3){(float)(p[0] - scene->centre[0]), (float)(p[1] - scene->centre[1]), (float)(p[2] - scene->centre[2])};
 }
 
-void pl_closest_hits(const pl_scene *scene, const double *origins, const float *directions,
-                     size_t count, int32_t *out_triangles, float *out_hits) {
+void pl_closest_hits(const pl_scene *scene, const double *origins, const float *directions, size_t count,
+                     int32_t *out_triangles, float *out_hits) {
     for (size_t i = 0; i < count; ++i) {
-        const pl_hit hit =
-            closest_hit(scene, recentred(scene, origins + 3 * i), vec3_from(directions + 3 * i), 0);
+        const pl_hit hit = closest_hit(scene, recentred(scene, origins + 3 * i), vec3_from(directions + 3 * i), 0);
         out_triangles[i] = hit.triangle;
         out_hits[3 * i] = hit.u;
         out_hits[3 * i + 1] = hit.v;
@@ -200,8 +203,7 @@ void pl_closest_hits(const pl_scene *scene, const double *origins, const float *
     }
 }
 
-void pl_occluded(const pl_scene *scene, const double *from, const double *to, size_t count,
-                 uint8_t *out_occluded) {
+void pl_occluded(const pl_scene *scene, const double *from, const double *to, size_t count, uint8_t *out_occluded) {
     for (size_t i = 0; i < count; ++i) {
         const vec3 origin = recentred(scene, from + 3 * i);
         const vec3 direction = vec3_sub(recentred(scene, to + 3 * i), origin);

@@ -36,8 +36,8 @@ static inline vec3 scene_vertex(const pl_scene *scene, int32_t triangle, int cor
 
 static inline vec3 scene_normal(const pl_scene *scene, int32_t triangle) {
     const vec3 a = scene_vertex(scene, triangle, 0);
-    return vec3_unit(vec3_cross(vec3_sub(scene_vertex(scene, triangle, 1), a),
-                                vec3_sub(scene_vertex(scene, triangle, 2), a)));
+    return vec3_unit(
+        vec3_cross(vec3_sub(scene_vertex(scene, triangle, 1), a), vec3_sub(scene_vertex(scene, triangle, 2), a)));
 }
 
 static inline vec3 scene_point(const pl_scene *scene, int32_t triangle, float weight_1, float weight_2) {

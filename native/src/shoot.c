@@ -35,8 +35,8 @@ static size_t owner_of_ray(const uint64_t *first_rays, size_t side_count, uint64
 }
 
 void pl_shoot(const pl_scene *scene, const pl_patches *patches, const uint64_t *first_rays,
-              const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count,
-              uint32_t seed, uint64_t *io_received, uint64_t *io_escaped) {
+              const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count, uint32_t seed,
+              uint64_t *io_received, uint64_t *io_escaped) {
     const size_t side_count = 2 * patches->patch_count;
     size_t side = count ? owner_of_ray(first_rays, side_count, first) : 0;
     pl_side_frame frame = side_frame(scene, patches, side);
@@ -48,10 +48,9 @@ void pl_shoot(const pl_scene *scene, const pl_patches *patches, const uint64_t *
         }
         const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
         const uint32_t k = first_samples[side] + (uint32_t)(ray - first_rays[side]);
-        const vec3 origin = side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed),
-                                        sobol(k, 1, side_seed));
-        const vec3 direction = cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), frame.u,
-                                                frame.v, frame.normal);
+        const vec3 origin = side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
+        const vec3 direction =
+            cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), frame.u, frame.v, frame.normal);
 
         const pl_hit hit = closest_hit(scene, origin, direction, 0);
         uint64_t flux[3];

@@ -9,7 +9,7 @@
 
 #include <math.h>
 
-enum { CHANNELS = 4, RADIUS = 2 };
+enum { CHANNELS = 3, RADIUS = 2 };
 static const float spline[RADIUS + 1] = {0.375f, 0.25f, 0.0625f}; /* B3 spline, from the middle out */
 
 typedef struct smooth_job {
@@ -37,8 +37,7 @@ static float geometric_weight(const smooth_job *job, size_t a, size_t b, float t
 
 /* How far two values are the same but for their noise. */
 static float value_weight(const smooth_job *job, size_t a, size_t b) {
-    const float difference =
-        luminance(job->values + CHANNELS * a) - luminance(job->values + CHANNELS * b);
+    const float difference = luminance(job->values + CHANNELS * a) - luminance(job->values + CHANNELS * b);
     const float noise = job->variances[a] + job->variances[b];
     return noise > 0 ? expf(-difference * difference / (4 * noise)) : (difference == 0 ? 1.0f : 0.0f);
 }
@@ -73,9 +72,9 @@ static void smooth_texel(const smooth_job *job, int32_t row, int32_t column, siz
     out_variances[receiver] = variance / (weights * weights);
 }
 
-void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
-               const float *variances, int32_t step, int32_t stops_on_value, int32_t first_row,
-               int32_t row_count, float *out_values, float *out_variances) {
+void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values, const float *variances,
+               int32_t step, int32_t stops_on_value, int32_t first_row, int32_t row_count, float *out_values,
+               float *out_variances) {
     const smooth_job job = {grid, receivers, values, variances, step, stops_on_value != 0};
     for (int32_t row = first_row; row < first_row + row_count; ++row) {
         for (int32_t column = 0; column < grid->width; ++column) {

@@ -14,9 +14,7 @@ static inline vec3 vec3_from(const float *p) { return (vec3){p[0], p[1], p[2]}; 
 static inline vec3 vec3_add(vec3 a, vec3 b) { return (vec3){a.x + b.x, a.y + b.y, a.z + b.z}; }
 static inline vec3 vec3_sub(vec3 a, vec3 b) { return (vec3){a.x - b.x, a.y - b.y, a.z - b.z}; }
 static inline vec3 vec3_scale(vec3 a, float s) { return (vec3){a.x * s, a.y * s, a.z * s}; }
-static inline vec3 vec3_mul_add(vec3 a, float s, vec3 b) {
-    return (vec3){a.x * s + b.x, a.y * s + b.y, a.z * s + b.z};
-}
+static inline vec3 vec3_mul_add(vec3 a, float s, vec3 b) { return (vec3){a.x * s + b.x, a.y * s + b.y, a.z * s + b.z}; }
 static inline float vec3_dot(vec3 a, vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 static inline vec3 vec3_cross(vec3 a, vec3 b) {
     return (vec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
