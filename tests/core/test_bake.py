@@ -79,11 +79,15 @@ def test_all_methods_and_solvers_bake_the_same_cornell_box(cornell_lightmaps, ro
     assert np.mean(second) == pytest.approx(np.mean(first), rel=0.02)
 
 
+def test_without_a_time_limit_sampling_goes_on_until_the_target_is_met(cornell_lightmaps):
+    for _, report in cornell_lightmaps.values():
+        assert report.target_reached
+        assert report.estimated_error <= report.target_error == 0.05
+
+
 def test_the_report_tells_what_ran(cornell_lightmaps):
     for (method, solver), (pixels, report) in cornell_lightmaps.items():
         assert (report.method, report.solver) == (method, solver)
-        assert report.target_reached
-        assert report.estimated_error <= report.target_error == 0.05
         assert report.lightmap_size == pixels.shape[::-1]
         assert report.triangles == len(cornell_box().triangles)
         assert report.patches > 0
@@ -95,7 +99,7 @@ def test_the_report_tells_what_ran(cornell_lightmaps):
 
 
 @pytest.mark.parametrize("scene", [cornell_box(), cube_room()], ids=["cornell", "lamp"])
-@pytest.mark.parametrize("error", [0.1, 0.03])
+@pytest.mark.parametrize("error", [0.1, 0.05])
 def test_the_estimated_error_is_honest(scene, error):
     """Two seeds differ by sqrt(2) times the error of one."""
     runs = [colours_and_errors(scene, error, seed) for seed in (1, 2, 3)]
@@ -136,11 +140,11 @@ def test_furnace(solver, rho):
     """Every wall of a closed box glows with L: E = pi L / (1 - rho) at every receiver, in every channel."""
     radiance = np.array([2.0, 1.0, 0.5])
     scene = closed_box(Material("glow", (rho,) * 3, radiance=tuple(radiance)), (1, 1.3, 0.8))
-    result = bake(scene, BakeSettings(target="vertex", solver=solver, error=0.02, threads=2, patch_size=0.25))
+    result = bake(scene, BakeSettings(target="vertex", solver=solver, error=0.03, threads=2, patch_size=0.25))
     found = result.corner_colours / (radiance / (1 - rho))
     # of the bounced light rho / (1 - rho): 0.001 not shot; the rest is the error asked for
     assert found.mean() == pytest.approx(1, abs=0.01)
-    assert np.sqrt(np.mean((found - 1) ** 2)) < 0.02 * 1.5 + 1e-3
+    assert np.sqrt(np.mean((found - 1) ** 2)) < 0.03 * 1.5 + 1e-3
 
 
 def test_furnace_in_a_lightmap():
@@ -175,10 +179,10 @@ def test_a_lamp_in_a_black_room_gives_the_cosine_law_on_the_texels():
 def test_objects_that_are_no_targets_stay_empty():
     scene = cornell_box()
     lamp = scene.objects[-1].span
-    colours = bake(scene, BakeSettings(target="vertex", error=0.3)).corner_colours
+    colours = bake(scene, BakeSettings(target="vertex", error=0.3, patch_size=0.3)).corner_colours
     assert np.isnan(colours[lamp]).all()
     assert np.isfinite(np.delete(colours, np.r_[lamp], axis=0)).all()
-    uvs = bake(scene, BakeSettings(texels=1024, error=0.3)).lightmap.uvs
+    uvs = bake(scene, BakeSettings(texels=1024, error=0.3, patch_size=0.3)).lightmap.uvs
     assert np.isnan(uvs[lamp]).all()
     assert np.isfinite(np.delete(uvs, np.r_[lamp], axis=0)).all()
 
@@ -213,7 +217,7 @@ def test_darkness_bakes_to_zero(target):
 def test_faces_without_area_bake_to_finite_colours(target):
     sliver = Part([(0.2, 0.2, 0.5), (0.4, 0.4, 0.5), (0.8, 0.8, 0.5)], [(0, 1, 2)], name="sliver")
     scene = scene_of([box((0, 0, 0), (1, 1, 1), inwards=True), sliver], cube_room().lights)
-    result = bake(scene, BakeSettings(target=target, texels=1024, error=0.2))
+    result = bake(scene, BakeSettings(target=target, texels=1024, error=0.2, patch_size=COARSE))
     assert np.isfinite(result.lightmap.pixels if result.lightmap else result.corner_colours).all()
 
 
@@ -239,7 +243,11 @@ def test_progress_rises_to_the_end_and_comes_from_the_calling_thread(settings):
 @pytest.mark.parametrize("target", ["lightmap", "vertex"])
 def test_a_bake_can_be_cancelled_at_every_stage_and_leaves_no_thread(target):
     seen = []
-    bake(cube_room(), BakeSettings(target=target, texels=1024, error=0.2), lambda s, f: seen.append(s) or True)
+    bake(
+        cube_room(),
+        BakeSettings(target=target, texels=1024, error=0.2, patch_size=COARSE),
+        lambda s, f: seen.append(s) or True,
+    )
     before = threading.active_count()
     for stage in dict.fromkeys(seen):
         calls = []
@@ -249,7 +257,9 @@ def test_a_bake_can_be_cancelled_at_every_stage_and_leaves_no_thread(target):
             return current != stage
 
         with pytest.raises(BakeCancelled):
-            bake(cube_room(), BakeSettings(target=target, texels=1024, error=0.2, threads=4), stop_at)
+            bake(
+                cube_room(), BakeSettings(target=target, texels=1024, error=0.2, patch_size=COARSE, threads=4), stop_at
+            )
         # once told to stop it asks no more
         assert calls.count(stage) == 1
         assert threading.active_count() == before
@@ -273,9 +283,9 @@ def test_an_exception_of_the_callback_comes_out_as_it_is():
 
 
 def test_a_time_limit_ends_sampling_and_the_report_says_so():
-    result = bake(cornell_box(), BakeSettings(texels=1024, error=0.005, time_limit=1e-3, patch_size=COARSE))
+    result = bake(cornell_box(), BakeSettings(texels=1024, error=0.02, time_limit=1e-3, patch_size=COARSE))
     assert not result.report.target_reached
-    assert result.report.estimated_error > 0.005
+    assert result.report.estimated_error > 0.02
     assert any("time limit" in warning for warning in result.report.warnings)
     assert np.isfinite(result.lightmap.pixels).all()
 
@@ -319,7 +329,7 @@ def test_a_smooth_sphere_is_smooth_in_vertex_colours():
 
 def test_corners_of_a_smooth_vertex_share_their_colour():
     scene = ball_scene()
-    colours = bake(scene, BakeSettings(target="vertex", error=0.3)).corner_colours
+    colours = bake(scene, BakeSettings(target="vertex", error=0.3, patch_size=0.3)).corner_colours
     for vertex in range(0, len(scene.vertices), 37):
         shared = colours[scene.triangles == vertex]
         assert (shared == shared[0]).all()
