@@ -1,4 +1,4 @@
-"""The bake as one straight line: triangles -> patches -> radiosity -> receivers -> irradiance -> lightmap or colours."""
+"""The bake, one straight line: triangles -> patches -> radiosity -> receivers -> irradiance -> lightmap or colours."""
 
 from __future__ import annotations
 

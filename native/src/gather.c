@@ -11,7 +11,7 @@
 
 #include <stdlib.h>
 
-enum { MOST_STEPS = 6 }; /* of a ray caught between surfaces that touch; then a mean has to do */
+enum { MOST_STEPS = 64 }; /* of a ray caught between surfaces that touch; then a mean has to do */
 
 typedef struct gather_job {
     const pl_scene *scene;
@@ -114,6 +114,12 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         direction = cosine_direction(x, y, u, v, normal);
         for (int k = 0; k < 3; ++k)
             weight[k] *= solution->reflectance[3 * (side / 2) + (size_t)k];
+        /* Russian roulette: what carries little ends early, and what is left stands for it */
+        const float survival = fminf(1, fmaxf(weight[0], fmaxf(weight[1], weight[2])));
+        if (draw(&random) >= survival)
+            return;
+        for (int k = 0; k < 3; ++k)
+            weight[k] /= survival;
     }
 }
 
