@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,8 +16,10 @@ REPLICATES = 4  # independent randomisations; their spread is the error estimate
 FIRST_RAYS = 8  # a replicate's rays in the first pass
 GROWTH = 4  # every further pass brings those that need it to so many times as many
 MOST_RAYS = 512  # of a replicate
+DIRECT_PASSES = 3  # each with four times the shadow rays of the one before, for the receivers that need it
+MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBES = 2048  # receivers at which the result is measured anew, to know its error
-PROBE_RAYS = 128  # of a replicate
+PROBE_RAYS = 256  # of a replicate
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
 DARK = 0.3  # of the median irradiance: what is added to a receiver's own before its error is called relative
 
@@ -54,6 +56,10 @@ class _Job:
     solution: PatchSolution
     receivers: Receivers
 
+    def part(self, chosen) -> _Job:
+        """The same for some of the receivers."""
+        return replace(self, receivers=Receivers(*(array[chosen] for array in self.receivers.arrays())))
+
     def gather(self, selected, first, take, seed, sums, on_step=None) -> int:
         return self.kernel.gather(
             self.solution, self.emitters, self.receivers, selected, REPLICATES, first, take, seed, sums, on_step
@@ -84,19 +90,30 @@ def gather_irradiance(
     if not len(receivers):
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, True, {"direct": 0, "gather": 0})
     job = _Job(kernel, emitters, solution, receivers)
-    direct, _, shadow_rays = kernel.direct(
-        emitters, receivers, shadow_samples(error), seed, lambda done: on_step(0.25 * done)
-    )
-    gathered, _, rays, in_time = _gather_until(job, grid, direct, error, seed, is_late, on_step)
-    values = (direct + gathered).astype(np.float32)
-    on_step(0.97)
-    rms, probe_rays = _probe(job, values, error, seed + 1)
-    traced = {"direct": int(shadow_rays), "gather": int(rays), "probe": int(probe_rays)}
+    direct, shadow_rays = _direct_until(job, error, seed, lambda done: on_step(0.25 * done))
+    probes = _probes(job, error, seed + 1)
+    values, rms, rays, in_time = _gather_until(job, grid, direct, probes, error, seed, is_late, on_step)
+    traced = {"direct": shadow_rays, "gather": rays, "probe": probes.rays}
     return Irradiance(values, rms, in_time and rms <= error, traced)
 
 
-def _gather_until(job: _Job, grid, direct, error, seed, is_late, on_step):
-    """Gathered light (N, 3), its variance (N,), the rays, and whether the time limit let all passes be made."""
+def _direct_until(job: _Job, error, seed, on_step):
+    """Direct irradiance (N, 3), receivers whose own estimate is too noisy measured again with more rays; and the rays."""
+    samples = shadow_samples(error)
+    direct, variance, rays = job.kernel.direct(job.emitters, job.receivers, samples, seed, on_step)
+    for attempt in range(1, DIRECT_PASSES):
+        noisy = np.flatnonzero(np.sqrt(variance) > 0.5 * error * _scale(direct))
+        if not len(noisy):
+            break
+        samples *= 4
+        again = job.kernel.direct(job.emitters, job.part(noisy).receivers, samples, seed + 1000 * attempt)
+        direct[noisy], variance[noisy] = again[:2]
+        rays += again[2]
+    return direct, rays
+
+
+def _gather_until(job: _Job, grid, direct, probes, error, seed, is_late, on_step):
+    """Irradiance (N, 3), its relative RMS error, the rays, and whether the time limit let all passes be made."""
     count = len(job.receivers)
     sums, taken = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64)
     active = np.arange(count, dtype=np.uint32)
@@ -109,14 +126,51 @@ def _gather_until(job: _Job, grid, direct, error, seed, is_late, on_step):
         taken[active] += take
         first, take = first + take, (GROWTH - 1) * (first + take)
         gathered, variance = _estimate(job, grid, sums / taken[:, None, None])
-        relative = np.sqrt(variance) / _scale(direct + gathered)
+        values = (direct + gathered).astype(np.float32)
+        relative = np.sqrt(variance) / _scale(values)
+        rms = probes.error(values)
+        # what the probes find and the replicates do not, is taken to be spread as the noise is
+        stated = np.sqrt(np.mean(relative[probes.chosen] ** 2))
+        relative *= min(max(rms / max(stated, 1e-12), 1.0), MOST_DOUBT)
         # once the whole is good enough, only what would show as a speckle goes on
-        limit = error if np.sqrt(np.mean(relative**2)) > error else 2 * error
-        active = active[relative[active] > limit]
+        active = active[relative[active] > (error if rms > error else 2 * error)]
         if not len(active) or first >= MOST_RAYS:
-            return gathered, variance, rays, True
+            return values, rms, rays, True
         if is_late():
-            return gathered, variance, rays, False
+            return values, rms, rays, False
+
+
+@dataclass(frozen=True, slots=True)
+class _Probes:
+    """Some receivers, measured with other and many more rays and without smoothing.
+
+    What a result differs from them there, less what they are uncertain by themselves, is its error: noise and smoothing
+    alike, by no assumption of the result's own.
+    """
+
+    chosen: np.ndarray  # (K,) receivers
+    luminance: np.ndarray  # (K,)
+    variance: np.ndarray  # (K,)
+    rays: int
+
+    def error(self, values) -> float:
+        """Relative RMS error of irradiance (N, 3)."""
+        scale = _scale(values)[self.chosen]
+        difference = values[self.chosen] @ LUMINANCE - self.luminance
+        # one wrong receiver counts as one, however wrong
+        squares = np.minimum((difference / scale) ** 2, 1.0) - np.minimum(self.variance / scale**2, 1.0)
+        return float(np.sqrt(max(squares.mean(), 0.0)))
+
+
+def _probes(job: _Job, error, seed) -> _Probes:
+    chosen = np.unique(np.linspace(0, len(job.receivers) - 1, PROBES).round().astype(np.uint32))
+    part = job.part(chosen)
+    direct, variance, shadow_rays = job.kernel.direct(job.emitters, part.receivers, 4 * shadow_samples(error), seed)
+    sums = np.zeros((len(chosen), REPLICATES, 3), np.float32)
+    rays = part.gather(np.arange(len(chosen), dtype=np.uint32), 0, PROBE_RAYS, seed, sums)
+    gathered = (sums / PROBE_RAYS) @ LUMINANCE
+    variance = variance + gathered.var(axis=1, ddof=1) / REPLICATES
+    return _Probes(chosen, direct @ LUMINANCE + gathered.mean(axis=1), variance, shadow_rays + rays)
 
 
 def _estimate(job, grid, means):
@@ -132,24 +186,3 @@ def _scale(irradiance):
     luminance = irradiance @ LUMINANCE
     lit = luminance[luminance > 1e-4 * max(luminance.mean(), 1e-30)]
     return luminance + DARK * (np.median(lit) if len(lit) else 1.0)
-
-
-def _probe(job: _Job, values, error, seed):
-    """Relative RMS error of the values, and the rays it took to know it.
-
-    Some receivers are measured anew, with other and many more rays and without smoothing; what the values differ from
-    that, less what it is itself uncertain by, is their error, noise and smoothing alike.
-    """
-    chosen = np.unique(np.linspace(0, len(values) - 1, PROBES).round().astype(np.uint32))
-    scale = _scale(values)[chosen]
-    part = Receivers(*(array[chosen] for array in job.receivers.arrays()))
-    direct, variance, shadow_rays = job.kernel.direct(job.emitters, part, 4 * shadow_samples(error), seed)
-    everyone = np.arange(len(chosen), dtype=np.uint32)
-    sums = np.zeros((len(chosen), REPLICATES, 3), np.float32)
-    rays = _Job(job.kernel, job.emitters, job.solution, part).gather(everyone, 0, PROBE_RAYS, seed, sums)
-    truth = (sums / PROBE_RAYS) @ LUMINANCE
-    variance = variance + truth.var(axis=1, ddof=1) / REPLICATES
-    difference = values[chosen] @ LUMINANCE - direct @ LUMINANCE - truth.mean(axis=1)
-    # one wrong receiver counts as one, however wrong
-    squares = np.minimum((difference / scale) ** 2, 1.0) - np.minimum(variance / scale**2, 1.0)
-    return float(np.sqrt(max(squares.mean(), 0.0))), shadow_rays + rays

@@ -66,6 +66,9 @@ def _lift(positions, corners, corner_normals, weights, flat):
 def patch_receivers(scene: Scene, kernel: KernelScene, patches, samples: int, seed: int) -> Receivers:
     """``samples`` receivers on each side of patches (K,): row (2 k + side) * samples + i is point i of patch k."""
     triangles, barycentrics = kernel.patch_points(patches, samples, seed)
+    # weights that do not sum to 1 would move the points off their plane, far from the origin by millimetres
+    barycentrics = barycentrics.astype(np.float64)
+    barycentrics /= barycentrics.sum(axis=1, keepdims=True)
     corners = scene.corners[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)

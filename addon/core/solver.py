@@ -57,15 +57,12 @@ def solve_direct(form_factors, reflectance, emitted, areas) -> Solution:
 
 
 def _dense_energy(form_factors, reflectance, emitted, areas, radiosity):
+    """Balance by rows, as the flux travels; ``unshot`` is what form factors that are not quite reciprocal leave open."""
     flux = areas[:, None] * radiosity
-    incoming = areas[:, None] * (form_factors @ radiosity)
-    escaped = flux.sum() - incoming.sum()
-    return Energy(
-        shot=float((areas[:, None] * emitted).sum()),
-        absorbed=float(((1 - reflectance) * incoming).sum()),
-        escaped=float(escaped),
-        unshot=float((areas[:, None] * (emitted + reflectance * (incoming / areas[:, None]) - radiosity)).sum()),
-    )
+    shot = float((areas[:, None] * emitted).sum())
+    absorbed = float(((1 - reflectance) * (form_factors.T @ flux)).sum())
+    escaped = float((flux * (1 - form_factors.sum(axis=1))[:, None]).sum())
+    return Energy(shot, absorbed, escaped, shot - absorbed - escaped)
 
 
 class ProgressiveRefinement:
@@ -94,7 +91,7 @@ class ProgressiveRefinement:
     def shoot(self, side: int) -> None:
         """Distribute what one side has not shot yet: B_j += rho_j F_ij A_i / A_j dB_i."""
         row = self._row(side)
-        arriving = (row * (self._areas[side] / self._areas))[:, None] * self.unshot[side]
+        arriving = (row * (self._areas[side] / np.maximum(self._areas, 1e-300)))[:, None] * self.unshot[side]
         reflected = self._reflectance * arriving
         landed = (self._areas[:, None] * arriving).sum()
         self.absorbed += float(landed - (self._areas[:, None] * reflected).sum())
@@ -162,7 +159,9 @@ def solve_stochastic(kernel, reflectance, emitted, areas, rays, unshot_limit, se
         traced += int(first_rays[-1])
         landed = received / scale
         reflected = reflectance * landed
-        absorbed += float((landed - reflected).sum())
+        # what neither landed nor left was taken by tinted glass
+        shot = (flux.astype(np.float64) * np.diff(first_rays).astype(np.float64)[:, None] / scale).sum()
+        absorbed += float(shot - (gone / scale).sum() - reflected.sum())
         escaped += float((gone / scale).sum())
         radiosity += reflected / np.maximum(areas, 1e-300)
         unshot = reflected
@@ -184,7 +183,7 @@ def _allot(unshot, rays, offset):
     per_ray[expected <= 0] = 0.0
     # the counts are rounded, so what is shot can exceed the flux a little
     shot = (per_ray * np.diff(first_rays).astype(np.float64)[:, None]).sum(axis=0)
-    scale = FULL / np.maximum(shot, 1e-300)
+    scale = FULL / np.where(shot > 0, shot, 1.0)
     shot_sides = np.diff(first_rays) > 0
     flux = np.zeros(unshot.shape, np.uint64)
     flux[shot_sides] = (per_ray[shot_sides] * scale).astype(np.uint64)

@@ -88,6 +88,7 @@ typedef struct pl_patches pl_patches;
 pl_status pl_patches_create(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
                             const int32_t *first_patches, size_t row_count, pl_patches **out_patches);
 void pl_patches_destroy(pl_patches *patches);
+size_t pl_patches_count(const pl_patches *patches);
 
 /*
  * Points spread evenly over patches, randomised quasi-Monte Carlo.
@@ -159,6 +160,7 @@ typedef struct pl_receivers {
     const double *positions;
     const float *normals;
     const int32_t *triangle_sides;
+    size_t count;
 } pl_receivers;
 
 /*

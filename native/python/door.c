@@ -30,7 +30,7 @@ static bool has_format(const Py_buffer *view, char format) {
     return found[0] == format && found[1] == 0;
 }
 
-static bool get_array(PyObject *object, door_array *array) {
+static bool get_array(PyObject *object, const door_array *arrays, door_array *array) {
     const int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (array->is_output ? PyBUF_WRITABLE : 0);
     if (PyObject_GetBuffer(object, &array->view, flags) < 0) {
         PyErr_Clear();
@@ -38,11 +38,17 @@ static bool get_array(PyObject *object, door_array *array) {
                      array->is_output ? ", writable" : "", type_name(array->format));
         return false;
     }
-    const bool fits =
-        has_format(&array->view, array->format) && array->view.len % (array->view.itemsize * array->columns) == 0;
-    if (!fits || (array->rows >= 0 && (Py_ssize_t)door_rows(array) != array->rows)) {
-        PyErr_Format(PyExc_TypeError, "%s: expected %s, %zd a row%s", array->name, type_name(array->format),
-                     array->columns, array->rows >= 0 ? ", as many rows as the arrays before it imply" : "");
+    const Py_ssize_t row_size = array->view.itemsize * array->columns;
+    if (!has_format(&array->view, array->format) || array->view.len % row_size != 0) {
+        PyErr_Format(PyExc_TypeError, "%s: expected %s, %zd a row", array->name, type_name(array->format),
+                     array->columns);
+        PyBuffer_Release(&array->view);
+        return false;
+    }
+    const Py_ssize_t rows = array->view.len / row_size;
+    const Py_ssize_t wanted = array->rows <= -2 ? (Py_ssize_t)door_rows(&arrays[-2 - array->rows]) : array->rows;
+    if (wanted >= 0 && rows != wanted) {
+        PyErr_Format(PyExc_ValueError, "%s: expected %zd rows, got %zd", array->name, wanted, rows);
         PyBuffer_Release(&array->view);
         return false;
     }
@@ -51,7 +57,7 @@ static bool get_array(PyObject *object, door_array *array) {
 
 bool door_arrays(PyObject *const *objects, door_array *arrays, size_t count) {
     for (size_t i = 0; i < count; ++i) {
-        if (!get_array(objects[i], &arrays[i])) {
+        if (!get_array(objects[i], arrays, &arrays[i])) {
             door_release(arrays, i);
             return false;
         }
@@ -62,6 +68,13 @@ bool door_arrays(PyObject *const *objects, door_array *arrays, size_t count) {
 void door_release(door_array *arrays, size_t count) {
     for (size_t i = 0; i < count; ++i)
         PyBuffer_Release(&arrays[i].view);
+}
+
+bool door_has_numbers(const door_array *array, size_t count) {
+    const size_t found = (size_t)(array->view.len / array->view.itemsize);
+    if (found != count)
+        PyErr_Format(PyExc_ValueError, "%s: expected %zu numbers, got %zu", array->name, count, found);
+    return found == count;
 }
 
 PyObject *door_result(pl_status status) {

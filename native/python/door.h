@@ -12,8 +12,10 @@
 
 /*
  * One array argument: its name for messages, its type as the buffer protocol spells it ('f' float32, 'd' float64,
- * 'i' int32, 'I' uint32, 'Q' uint64, 'B' uint8), numbers per row, rows expected (-1: any), and whether it is written.
+ * 'i' int32, 'I' uint32, 'Q' uint64, 'B' uint8), numbers per row, rows expected (-1: any, AS_MANY_ROWS_AS(k): as the
+ * k-th array of the list), and whether it is written.
  */
+#define AS_MANY_ROWS_AS(k) (-2 - (k))
 typedef struct door_array {
     const char *name;
     char format;
@@ -28,6 +30,9 @@ void door_release(door_array *arrays, size_t count);
 static inline size_t door_rows(const door_array *array) {
     return (size_t)(array->view.len / array->view.itemsize / array->columns);
 }
+
+/* Whether an array holds so many numbers; an exception names it where not. */
+bool door_has_numbers(const door_array *array, size_t count);
 
 /* NULL with the exception that the status means; None for PL_OK. */
 PyObject *door_result(pl_status status);

@@ -38,7 +38,7 @@ static PyObject *create_scene(PyObject *self, PyObject *args) {
     const pl_embree *embree = PyCapsule_GetPointer(parent, EMBREE);
     door_array arrays[] = {{"vertices", 'd', 3, -1, false, {0}},
                            {"triangles", 'i', 3, -1, false, {0}},
-                           {"transmittance", 'f', 3, -1, false, {0}}};
+                           {"transmittance", 'f', 3, AS_MANY_ROWS_AS(1), false, {0}}};
     const size_t count = objects[2] == Py_None ? 2 : 3;
     if (!embree || !door_arrays(objects, arrays, count))
         return NULL;
@@ -74,9 +74,9 @@ static PyObject *closest_hits(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
     door_array arrays[] = {{"origins", 'd', 3, -1, false, {0}},
-                           {"directions", 'f', 3, -1, false, {0}},
-                           {"out_triangles", 'i', 1, -1, true, {0}},
-                           {"out_hits", 'f', 3, -1, true, {0}}};
+                           {"directions", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"out_triangles", 'i', 1, AS_MANY_ROWS_AS(0), true, {0}},
+                           {"out_hits", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}}};
     if (!scene || !door_arrays(objects, arrays, 4))
         return NULL;
 
@@ -96,8 +96,8 @@ static PyObject *occluded(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
     door_array arrays[] = {{"points_from", 'd', 3, -1, false, {0}},
-                           {"points_to", 'd', 3, -1, false, {0}},
-                           {"out_occluded", 'B', 1, -1, true, {0}}};
+                           {"points_to", 'd', 3, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"out_occluded", 'B', 1, AS_MANY_ROWS_AS(0), true, {0}}};
     if (!scene || !door_arrays(objects, arrays, 3))
         return NULL;
 
@@ -141,6 +141,11 @@ static PyObject *patch_points(PyObject *self, PyObject *args) {
                            {"out_barycentrics", 'f', 3, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 3))
         return NULL;
+    const size_t points = door_rows(&arrays[0]) * samples;
+    if (!door_has_numbers(&arrays[1], points) || !door_has_numbers(&arrays[2], 3 * points)) {
+        door_release(arrays, 3);
+        return NULL;
+    }
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_patch_points(patches, arrays[0].view.buf, door_rows(&arrays[0]), samples, seed, arrays[1].view.buf,
@@ -160,9 +165,14 @@ static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
         return NULL;
+    if (!door_has_numbers(&arrays[1], door_rows(&arrays[0]) * (size_t)sides)) {
+        door_release(arrays, 2);
+        return NULL;
+    }
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_form_factors_monte_carlo(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]), rays, seed,
@@ -183,9 +193,14 @@ static PyObject *form_factors_hemicube(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
         return NULL;
+    if (!door_has_numbers(&arrays[1], door_rows(&arrays[0]) * (size_t)sides)) {
+        door_release(arrays, 2);
+        return NULL;
+    }
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_form_factors_hemicube(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]), resolution, positions,
@@ -206,7 +221,8 @@ static PyObject *openness(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
-    door_array arrays[] = {{"reaches", 'f', 1, -1, false, {0}}, {"out_openness", 'f', 1, -1, true, {0}}};
+    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
+    door_array arrays[] = {{"reaches", 'f', 1, sides, false, {0}}, {"out_openness", 'f', 1, sides, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
         return NULL;
 
@@ -228,10 +244,11 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
-    door_array arrays[] = {{"first_rays", 'Q', 1, -1, false, {0}},
-                           {"first_samples", 'I', 1, -1, false, {0}},
-                           {"ray_flux", 'Q', 3, -1, false, {0}},
-                           {"io_received", 'Q', 3, -1, true, {0}},
+    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
+    door_array arrays[] = {{"first_rays", 'Q', 1, sides + 1, false, {0}},
+                           {"first_samples", 'I', 1, sides, false, {0}},
+                           {"ray_flux", 'Q', 3, sides, false, {0}},
+                           {"io_received", 'Q', 3, sides, true, {0}},
                            {"io_escaped", 'Q', 3, 1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 5))
         return NULL;
@@ -246,17 +263,18 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
 }
 
 /* The five arrays of a light table, as every function that samples lights takes them. */
-#define LIGHT_ARRAYS                                                                                                   \
-    {"light_kinds", 'i', 1, -1, false, {0}}, {"light_parameters", 'f', PL_LIGHT_FLOATS, -1, false, {0}},               \
-        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 6, -1, false, {0}}, {                      \
-        "light_cumulative", 'f', 1, -1, false, {0}                                                                     \
+#define LIGHT_ARRAYS(at)                                                                                               \
+    {"light_kinds", 'i', 1, -1, false, {0}},                                                                           \
+        {"light_parameters", 'f', PL_LIGHT_FLOATS, AS_MANY_ROWS_AS(at), false, {0}},                                   \
+        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 6, AS_MANY_ROWS_AS((at) + 2), false, {0}}, \
+    {                                                                                                                  \
+        "light_cumulative", 'f', 1, AS_MANY_ROWS_AS((at) + 2), false, {0}                                              \
+    }
+#define RECEIVER_ARRAYS(at)                                                                                            \
+    {"positions", 'd', 3, -1, false, {0}}, {"normals", 'f', 3, AS_MANY_ROWS_AS(at), false, {0}}, {                     \
+        "triangle_sides", 'i', 1, AS_MANY_ROWS_AS(at), false, {0}                                                      \
     }
 enum { LIGHT_ARRAY_COUNT = 5, RECEIVER_ARRAY_COUNT = 3 };
-
-#define RECEIVER_ARRAYS                                                                                                \
-    {"positions", 'd', 3, -1, false, {0}}, {"normals", 'f', 3, -1, false, {0}}, {                                      \
-        "triangle_sides", 'i', 1, -1, false, {0}                                                                       \
-    }
 
 static pl_lights lights_of(const door_array *arrays) {
     return (pl_lights){arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
@@ -264,7 +282,7 @@ static pl_lights lights_of(const door_array *arrays) {
 }
 
 static pl_receivers receivers_of(const door_array *arrays) {
-    return (pl_receivers){arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf};
+    return (pl_receivers){arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf, door_rows(&arrays[0])};
 }
 
 /* Items of a tuple argument into objects[0..count); false with an exception if it is no tuple of that many. */
@@ -298,20 +316,25 @@ static PyObject *gather(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
-    door_array arrays[] = {{"radiosity", 'f', 3, -1, false, {0}},
-                           {"direct", 'f', 3, -1, false, {0}},
-                           {"reflectance", 'f', 3, -1, false, {0}},
-                           {"kinds", 'B', 1, -1, false, {0}},
-                           {"reaches", 'f', 1, -1, false, {0}},
+    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
+    door_array arrays[] = {{"radiosity", 'f', 3, sides, false, {0}},
+                           {"direct", 'f', 3, sides, false, {0}},
+                           {"reflectance", 'f', 3, sides / 2, false, {0}},
+                           {"kinds", 'B', 1, sides, false, {0}},
+                           {"reaches", 'f', 1, sides, false, {0}},
                            {"sky", 'f', 3, 1, false, {0}},
-                           LIGHT_ARRAYS,
-                           RECEIVER_ARRAYS,
+                           LIGHT_ARRAYS(LIGHTS),
+                           RECEIVER_ARRAYS(RECEIVERS),
                            {"selected", 'I', 1, -1, false, {0}},
                            {"io_sums", 'f', 3, -1, true, {0}}};
     if (!patches || !unpack(solution_arrays, FIELDS, objects) ||
         !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects + LIGHTS) ||
         !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
+    if (!door_has_numbers(&arrays[SUMS], 3 * (size_t)rays.replicates * door_rows(&arrays[RECEIVERS]))) {
+        door_release(arrays, ARRAYS);
+        return NULL;
+    }
     const float *sky = arrays[5].view.buf;
     const pl_solution solution = {arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf,
                                   arrays[3].view.buf, arrays[4].view.buf, {sky[0], sky[1], sky[2]}};
@@ -339,10 +362,10 @@ static PyObject *direct(PyObject *self, PyObject *args) {
                           &objects[IRRADIANCE], &objects[VARIANCE]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
-    door_array arrays[] = {LIGHT_ARRAYS,
-                           RECEIVER_ARRAYS,
-                           {"out_irradiance", 'f', 3, -1, true, {0}},
-                           {"out_variance", 'f', 1, -1, true, {0}}};
+    door_array arrays[] = {LIGHT_ARRAYS(0),
+                           RECEIVER_ARRAYS(RECEIVERS),
+                           {"out_irradiance", 'f', 3, AS_MANY_ROWS_AS(RECEIVERS), true, {0}},
+                           {"out_variance", 'f', 1, AS_MANY_ROWS_AS(RECEIVERS), true, {0}}};
     if (!scene || !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects) ||
         !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
@@ -368,12 +391,12 @@ static PyObject *smooth(PyObject *self, PyObject *args) {
                           &grid.spacing, &receiver_arrays, &objects[VALUES], &objects[VARIANCES], &step,
                           &stops_on_value, &first_row, &row_count, &objects[OUT_VALUES], &objects[OUT_VARIANCES]))
         return NULL;
-    door_array arrays[] = {RECEIVER_ARRAYS,
+    door_array arrays[] = {RECEIVER_ARRAYS(0),
                            {"grid", 'i', 1, (Py_ssize_t)grid.width * grid.height, false, {0}},
-                           {"values", 'f', 3, -1, false, {0}},
-                           {"variances", 'f', 1, -1, false, {0}},
-                           {"out_values", 'f', 3, -1, true, {0}},
-                           {"out_variances", 'f', 1, -1, true, {0}}};
+                           {"values", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}},
+                           {"out_variances", 'f', 1, AS_MANY_ROWS_AS(0), true, {0}}};
     if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
     const pl_receivers receivers = receivers_of(arrays);

@@ -84,13 +84,29 @@ typedef struct light_sums {
     uint32_t visible, taken;
 } light_sums;
 
+/*
+ * The k-th sample of a light. Where the light has a closed form, samples only say which share of it is seen, so one
+ * that falls below the horizon, or on a triangle's dark side, is drawn again: else a light of which no sample could
+ * shine would be lost.
+ */
+static bool sample_above_horizon(const direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed,
+                                 uint32_t k, pl_light_sample *out_sample) {
+    const uint32_t tries = light_has_closed_form(job->lights, light) ? 32 : 1;
+    for (uint32_t try = 0; try < tries; ++try) {
+        const uint32_t try_seed = try ? hash_pair(seed, 0x40000000u + try) : seed;
+        if (light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 0, try_seed),
+                         sobol(k, 1, try_seed), out_sample))
+            return true;
+    }
+    return false;
+}
+
 static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed, uint32_t first,
                          uint32_t end, light_sums *io_sums) {
     for (uint32_t k = first; k < end; ++k) {
         pl_light_sample sample;
         ++io_sums->taken;
-        if (!light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 0, seed), sobol(k, 1, seed),
-                          &sample))
+        if (!sample_above_horizon(job, frame, light, seed, k, &sample))
             continue;
         for (int c = 0; c < 3; ++c)
             io_sums->all[c] += sample.irradiance[c];
@@ -129,7 +145,7 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
         return;
     }
     const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
-    const uint32_t few = most < 8 ? most : most / 8 < 4 ? 4 : most / 8;
+    const uint32_t few = most < 8 ? most : most / 4 < 8 ? 8 : most / 4;
     light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}, {{0}, {0}, 0, 0}};
     uint32_t visible = 0, taken = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {
@@ -205,6 +221,9 @@ static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint
 pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers, size_t first,
                     size_t count, uint32_t samples, uint32_t seed, float *out_irradiance, float *out_variance,
                     uint64_t *out_rays) {
+    for (size_t i = first; i < first + count; ++i)
+        if (!receiver_is_valid(scene, receivers, i))
+            return PL_ERR_ARGUMENT;
     direct_job job = {.scene = scene, .lights = lights, .samples = samples ? samples : 1, .seed = seed};
     job.importances = malloc(sizeof(float) * (lights->count + 1));
     if (!job.importances || !light_balls_create(lights, &job.balls)) {

@@ -126,6 +126,9 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
 pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
                     const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected, size_t count,
                     pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
+    for (size_t i = 0; i < count; ++i)
+        if (!receiver_is_valid(scene, receivers, selected[i]))
+            return PL_ERR_ARGUMENT;
     gather_job job = {.scene = scene, .patches = patches, .solution = solution, .lights = lights};
     job.importances = malloc(sizeof(float) * (lights->count + 1));
     if (!job.importances || !light_balls_create(lights, &job.balls)) {

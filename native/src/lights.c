@@ -400,6 +400,15 @@ float light_importances(const pl_lights *lights, const pl_light_balls *balls, ve
     return total;
 }
 
+bool light_has_closed_form(const pl_lights *lights, size_t light) {
+    const float *p = parameters_of(lights, light);
+    if (lights->kinds[light] == PL_LIGHT_AREA) {
+        const area_light lamp = area_of(p);
+        return area_is_exact(&lamp);
+    }
+    return lights->kinds[light] == PL_LIGHT_MESH && mesh_of(p).count <= EXACT_TRIANGLES;
+}
+
 bool light_exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]) {
     const float *p = parameters_of(lights, light);
     if (lights->kinds[light] == PL_LIGHT_AREA) {

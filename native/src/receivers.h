@@ -28,4 +28,9 @@ static inline pl_receiver_frame receiver_frame(const pl_scene *scene, const pl_r
     return frame;
 }
 
+static inline bool receiver_is_valid(const pl_scene *scene, const pl_receivers *receivers, size_t index) {
+    return index < receivers->count && receivers->triangle_sides[index] >= 0 &&
+           (size_t)receivers->triangle_sides[index] < 2 * scene->triangle_count;
+}
+
 #endif

@@ -26,6 +26,13 @@ static void recentre(pl_scene *scene, const double *vertices) {
         scene->vertices[i] = (float)(vertices[i] - scene->centre[i % 3]);
 }
 
+/* Whether a triangle's corners lie on a line to within their rounding: such a one must never be hit. */
+static bool is_degenerate(const pl_scene *scene, int32_t triangle) {
+    const vec3 a = scene_vertex(scene, triangle, 0);
+    const vec3 ab = vec3_sub(scene_vertex(scene, triangle, 1), a), ac = vec3_sub(scene_vertex(scene, triangle, 2), a);
+    return vec3_length(vec3_cross(ab, ac)) <= 2.4e-7f * vec3_length(ab) * vec3_length(ac);
+}
+
 /* One BVH over the triangles that are clear, or over those that are not. */
 static pl_status build_layer(pl_scene *scene, bool clear, pl_layer *out_layer) {
     const pl_embree *embree = scene->embree;
@@ -57,6 +64,8 @@ static pl_status build_layer(pl_scene *scene, bool clear, pl_layer *out_layer) {
             if (transmits(scene, t) != clear)
                 continue;
             memcpy(index_buffer + 3 * k, scene->indices + 3 * t, 3 * sizeof(uint32_t));
+            if (is_degenerate(scene, (int32_t)t))
+                index_buffer[3 * k + 1] = index_buffer[3 * k + 2] = index_buffer[3 * k];
             out_layer->triangles[k++] = (int32_t)t;
         }
         embree->commit_geometry(geometry);
