@@ -68,7 +68,7 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
 
         progress.begin("gather")
         irradiance = gather_irradiance(
-            kernel, solved.emitters, solved.patches, receivers, grid, settings.error, settings.seed,
+            kernel, solved, receivers, grid, settings.error, settings.seed,
             lambda: settings.time_limit is not None and progress.elapsed > settings.time_limit, progress.step,
         )  # fmt: skip
 

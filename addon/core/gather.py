@@ -6,16 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .emitters import LUMINANCE, Emitters
+from .emitters import LUMINANCE
 from .kernel import KernelScene
-from .radiosity import PatchSolution
+from .radiosity import Solved
 from .receivers import Receivers
 from .smoothing import TexelGrid, smoothed
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
 FIRST_RAYS = 8  # a replicate's rays in the first pass
 GROWTH = 4  # every further pass brings those that need it to so many times as many
-MOST_RAYS = 512  # of a replicate
+MOST_RAYS = 2048  # of a replicate
+PASS_COST = 2.0  # times all rays before it that a pass may take, and FREE_RAYS at least
+FREE_RAYS = 1 << 25
 DIRECT_PASSES = 3  # each with four times the shadow rays of the one before, for the receivers that need it
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBES = 2048  # receivers at which the result is measured anew, to know its error
@@ -52,8 +54,7 @@ class _Job:
     """What all passes share."""
 
     kernel: KernelScene
-    emitters: Emitters
-    solution: PatchSolution
+    solved: Solved
     receivers: Receivers
 
     def part(self, chosen) -> _Job:
@@ -62,14 +63,22 @@ class _Job:
 
     def gather(self, selected, first, take, seed, sums, on_step=None) -> int:
         return self.kernel.gather(
-            self.solution, self.emitters, self.receivers, selected, REPLICATES, first, take, seed, sums, on_step
+            self.solved.patches,
+            self.solved.emitters,
+            self.receivers,
+            selected,
+            REPLICATES,
+            first,
+            take,
+            seed,
+            sums,
+            on_step,
         )
 
 
 def gather_irradiance(
     kernel: KernelScene,
-    emitters: Emitters,
-    solution: PatchSolution,
+    solved: Solved,
     receivers: Receivers,
     grid: TexelGrid | None,
     error: float,
@@ -81,7 +90,7 @@ def gather_irradiance(
 
     Parameters
     ----------
-    solution : the patches' reflected light; emission is left out of it, as emitters are sampled directly
+    solved : the patches' reflected light, and what direct light is sampled from
     grid : the texels that the receivers are, over which gathered light is smoothed; None = no smoothing
     error : target of the relative error of every receiver [1]
     is_late : () -> bool, whether the time limit has passed; the first pass is always finished
@@ -89,7 +98,7 @@ def gather_irradiance(
     """
     if not len(receivers):
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, True, {"direct": 0, "gather": 0})
-    job = _Job(kernel, emitters, solution, receivers)
+    job = _Job(kernel, solved, receivers)
     direct, shadow_rays = _direct_until(job, error, seed, lambda done: on_step(0.25 * done))
     probes = _probes(job, error, seed + 1)
     values, rms, rays, in_time = _gather_until(job, grid, direct, probes, error, seed, is_late, on_step)
@@ -98,15 +107,15 @@ def gather_irradiance(
 
 
 def _direct_until(job: _Job, error, seed, on_step):
-    """Direct irradiance (N, 3), receivers whose own estimate is too noisy measured again with more rays; and the rays."""
+    """Direct irradiance (N, 3), with more rays where an estimate is too noisy, and the rays."""
     samples = shadow_samples(error)
-    direct, variance, rays = job.kernel.direct(job.emitters, job.receivers, samples, seed, on_step)
+    direct, variance, rays = job.kernel.direct(job.solved.sources, job.receivers, samples, seed, on_step)
     for attempt in range(1, DIRECT_PASSES):
         noisy = np.flatnonzero(np.sqrt(variance) > 0.5 * error * _scale(direct))
         if not len(noisy):
             break
         samples *= 4
-        again = job.kernel.direct(job.emitters, job.part(noisy).receivers, samples, seed + 1000 * attempt)
+        again = job.kernel.direct(job.solved.sources, job.part(noisy).receivers, samples, seed + 1000 * attempt)
         direct[noisy], variance[noisy] = again[:2]
         rays += again[2]
     return direct, rays
@@ -125,15 +134,12 @@ def _gather_until(job: _Job, grid, direct, probes, error, seed, is_late, on_step
         rays += job.gather(active, first, take, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
         taken[active] += take
         first, take = first + take, (GROWTH - 1) * (first + take)
-        gathered, variance = _estimate(job, grid, sums / taken[:, None, None])
-        values = (direct + gathered).astype(np.float32)
-        relative = np.sqrt(variance) / _scale(values)
-        rms = probes.error(values)
-        # what the probes find and the replicates do not, is taken to be spread as the noise is
-        stated = np.sqrt(np.mean(relative[probes.chosen] ** 2))
-        relative *= min(max(rms / max(stated, 1e-12), 1.0), MOST_DOUBT)
+        values, relative, rms = _best_estimate(job, grid, sums / taken[:, None, None], direct, probes)
         # once the whole is good enough, only what would show as a speckle goes on
-        active = active[relative[active] > (error if rms > error else 2 * error)]
+        active = np.flatnonzero(relative > (error if rms > error else 2 * error)).astype(np.uint32)
+        if not len(active) and rms > error:
+            active = np.arange(count, dtype=np.uint32)
+        active = _affordable(active[taken[active] == first], relative, rays, take)
         if not len(active) or first >= MOST_RAYS:
             return values, rms, rays, True
         if is_late():
@@ -165,7 +171,9 @@ class _Probes:
 def _probes(job: _Job, error, seed) -> _Probes:
     chosen = np.unique(np.linspace(0, len(job.receivers) - 1, PROBES).round().astype(np.uint32))
     part = job.part(chosen)
-    direct, variance, shadow_rays = job.kernel.direct(job.emitters, part.receivers, 4 * shadow_samples(error), seed)
+    direct, variance, shadow_rays = job.kernel.direct(
+        job.solved.sources, part.receivers, 4 * shadow_samples(error), seed
+    )
     sums = np.zeros((len(chosen), REPLICATES, 3), np.float32)
     rays = part.gather(np.arange(len(chosen), dtype=np.uint32), 0, PROBE_RAYS, seed, sums)
     gathered = (sums / PROBE_RAYS) @ LUMINANCE
@@ -173,12 +181,34 @@ def _probes(job: _Job, error, seed) -> _Probes:
     return _Probes(chosen, direct @ LUMINANCE + gathered.mean(axis=1), variance, shadow_rays + rays)
 
 
-def _estimate(job, grid, means):
-    if grid is not None:
-        return smoothed(job.kernel.workers, grid, job.receivers, means)
+def _affordable(active, relative, rays, take):
+    """Those of the receivers that a pass can afford, the noisiest first; in order."""
+    most = int(max(PASS_COST * rays, FREE_RAYS) / (take * REPLICATES))
+    if len(active) <= most:
+        return active
+    return np.sort(active[np.argsort(-relative[active], kind="stable")[:most]])
+
+
+def _best_estimate(job, grid, means, direct, probes):
+    """Irradiance (N, 3), its relative noise (N,) and relative RMS error, from replicate means (N, R, 3).
+
+    Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
+    """
     variance = (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES
     pooled = np.convolve(variance, np.full(POOL, 1 / POOL), "same") if len(variance) >= POOL else variance
-    return means.mean(axis=1), pooled
+    estimates = [(means.mean(axis=1), pooled)]
+    if grid is not None:
+        estimates.append(smoothed(job.kernel.workers, grid, job.receivers, means))
+    best = None
+    for gathered, noise in estimates:
+        values = (direct + gathered).astype(np.float32)
+        rms = probes.error(values)
+        if best is None or rms < best[2]:
+            relative = np.sqrt(noise) / _scale(values)
+            # what the probes find and the replicates do not, is taken to be spread as the noise is
+            stated = np.sqrt(np.mean(relative[probes.chosen] ** 2))
+            best = values, relative * min(max(rms / max(stated, 1e-12), 1.0), MOST_DOUBT), rms
+    return best
 
 
 def _scale(irradiance):

@@ -68,7 +68,8 @@ class Solved:
     Attributes
     ----------
     patches : PatchSolution
-    emitters : the scene's, and the sides that are so bright that receivers sample them as lights
+    emitters : the scene's lights and glowing triangles
+    sources : the same, and the sides that are so bright that receivers sample them as lights
     solution : the solver's own result
     method, choice : what was picked, and why
     rays : {"patches": ..., "solve": ...}
@@ -76,6 +77,7 @@ class Solved:
 
     patches: PatchSolution
     emitters: Emitters
+    sources: Emitters
     solution: Solution
     method: str
     choice: str
@@ -106,7 +108,9 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
         sky=sky,
     )
     sources = _as_sources(scene, kernel, patches, emitters, solution.radiosity, bright)
-    return Solved(field, sources, solution, method, choice, {"patches": traced + sky_rays, "solve": solution.rays})
+    return Solved(
+        field, emitters, sources, solution, method, choice, {"patches": traced + sky_rays, "solve": solution.rays}
+    )
 
 
 def _side_kinds(patches, radiosity, spread):

@@ -16,7 +16,7 @@ from .receivers import Receivers
 from .texels import TexelMap
 from .workers import Workers
 
-STEPS = (1, 2, 4)  # texels between the taps of successive levels
+STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,7 +57,7 @@ def solve_direct(form_factors, reflectance, emitted, areas) -> Solution:
 
 
 def _dense_energy(form_factors, reflectance, emitted, areas, radiosity):
-    """Balance by rows, as the flux travels; ``unshot`` is what form factors that are not quite reciprocal leave open."""
+    """Balance by rows, as flux travels; ``unshot`` is what form factors that are not quite reciprocal leave open."""
     flux = areas[:, None] * radiosity
     shot = float((areas[:, None] * emitted).sum())
     absorbed = float(((1 - reflectance) * (form_factors.T @ flux)).sum())

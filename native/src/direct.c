@@ -48,6 +48,9 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
     const size_t chosen = choose_light(importances, lights->count, total, random[0]);
     if (!light_sample(lights, chosen, origin, normal, random[1], random[2], &sample))
         return false;
+    /* the sample's own estimate has no bound close to a lamp: where there is a closed form the ray only says whether
+       the lamp is seen */
+    (void)light_exact(lights, chosen, origin, normal, sample.irradiance);
     if (!is_occluded(scene, origin, sample.direction, sample.far)) {
         transmit(scene, origin, sample.direction, sample.far, sample.irradiance);
         for (int c = 0; c < 3; ++c)
@@ -145,7 +148,7 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
         return;
     }
     const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
-    const uint32_t few = most < 8 ? most : most / 4 < 8 ? 8 : most / 4;
+    const uint32_t few = most < 8 ? most : most * 3 / 8 < 8 ? 8 : most * 3 / 8;
     light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}, {{0}, {0}, 0, 0}};
     uint32_t visible = 0, taken = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {

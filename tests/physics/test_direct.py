@@ -169,7 +169,8 @@ def test_a_constant_sky_gives_pi_l_on_an_open_plane(points):
     light, _ = full_light(scene, floor_receivers(points), error=0.1)
     # every ray sees the sky
     assert light.values == pytest.approx(np.tile(np.pi * COLOUR, (len(points), 1)), rel=1e-5)
-    assert light.relative_error == pytest.approx(0, abs=1e-6)
+    # float32 sums of 1000 rays are good to about 1e-6 each; their differences are what is left here
+    assert light.relative_error == pytest.approx(0, abs=1e-5)
 
 
 def test_half_a_sky_gives_half_the_light():

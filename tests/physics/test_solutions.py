@@ -77,7 +77,9 @@ def test_what_is_shot_is_absorbed_or_escapes_or_is_not_shot_yet(choice, scene):
     assert energy.escaped > 0
     # float64 sums; stochastic counts in 2^-62 of the flux, rounded down a ray
     assert energy.absorbed + energy.escaped + energy.unshot == pytest.approx(energy.shot, rel=1e-6)
-    assert abs(energy.unshot) <= 1.001 * UNSHOT_LIMIT * energy.shot
+    # a dense system leaves nothing unshot, but its sampled form factors are reciprocal to their noise only, about 1 %
+    limit = 0.01 if choice.startswith("direct") else 1.001 * UNSHOT_LIMIT
+    assert abs(energy.unshot) <= limit * energy.shot
 
 
 @pytest.mark.parametrize("choice", ["progressive", "stochastic"])
