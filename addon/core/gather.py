@@ -16,8 +16,8 @@ REPLICATES = 4  # independent randomisations; their spread is the error estimate
 FIRST_RAYS = 8  # a replicate's rays in the first pass
 GROWTH = 4  # every further pass brings those that need it to so many times as many
 MOST_RAYS = 2048  # of a replicate
-PASS_COST = 2.0  # times all rays before it that a pass may take, and FREE_RAYS at least
-FREE_RAYS = 1 << 25
+MOST_COST = 8  # times the rays of the first pass that all passes may take, and FREE_RAYS at least
+FREE_RAYS = 1 << 26
 DIRECT_PASSES = 3  # each with four times the shadow rays of the one before, for the receivers that need it
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBES = 2048  # receivers at which the result is measured anew, to know its error
@@ -125,25 +125,54 @@ def _gather_until(job: _Job, grid, direct, probes, error, seed, is_late, on_step
     """Irradiance (N, 3), its relative RMS error, the rays, and whether the time limit let all passes be made."""
     count = len(job.receivers)
     sums, taken = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64)
-    active = np.arange(count, dtype=np.uint32)
-    first, take, rays = 0, FIRST_RAYS, 0
+    active, rays, budget, begin = np.arange(count, dtype=np.uint32), 0, 0, 0.25
     while True:
-        # later passes are for few receivers: half of the bar is the first, a half of what is left each later one
-        begin = 0.95 - 0.7 * 0.5 ** np.log2(1 + first / FIRST_RAYS)
-        width = 0.35 if first == 0 else 0.5 * (0.95 - begin)
-        rays += job.gather(active, first, take, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
-        taken[active] += take
-        first, take = first + take, (GROWTH - 1) * (first + take)
+        # half of what is left of the bar for each pass: nobody knows how many there will be
+        width = 0.5 * (1 - begin)
+        rays += _gather_pass(job, active, taken, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
+        begin += width
+        budget = budget or max(MOST_COST * rays, FREE_RAYS)
         values, relative, rms = _best_estimate(job, grid, sums / taken[:, None, None], direct, probes)
         # once the whole is good enough, only what would show as a speckle goes on
-        active = np.flatnonzero(relative > (error if rms > error else 2 * error)).astype(np.uint32)
+        active = np.flatnonzero(relative > (error if rms > error else 2 * error))
         if not len(active) and rms > error:
-            active = np.arange(count, dtype=np.uint32)
-        active = _affordable(active[taken[active] == first], relative, rays, take)
-        if not len(active) or first >= MOST_RAYS:
+            active = np.arange(count)
+        active = _affordable(active[taken[active] < MOST_RAYS], relative, taken, budget - rays)
+        if not len(active):
             return values, rms, rays, True
         if is_late():
             return values, rms, rays, False
+
+
+def _gather_pass(job: _Job, active, taken, seed, sums, on_step) -> int:
+    """Bring receivers to GROWTH times the rays they have, each going on in its own sequence; the rays traced."""
+    rays, done = 0, 0
+    for first in np.unique(taken[active]):
+        group = np.ascontiguousarray(active[taken[active] == first], np.uint32)
+        start, share = done / len(active), len(group) / len(active)
+        rays += job.gather(
+            group,
+            int(first),
+            _next_rays(first),
+            seed,
+            sums,
+            lambda part: on_step(start + share * part),  # noqa: B023
+        )
+        done += len(group)
+    taken[active] += _next_rays(taken[active])
+    return rays
+
+
+def _next_rays(taken):
+    """Rays of a replicate that the next pass adds."""
+    return np.maximum((GROWTH - 1) * taken, FIRST_RAYS)
+
+
+def _affordable(active, relative, taken, rays_left):
+    """Those of the receivers that a pass can afford, the noisiest first; in order."""
+    noisiest = active[np.argsort(-relative[active], kind="stable")]
+    costs = np.cumsum(REPLICATES * _next_rays(taken[noisiest]))
+    return np.sort(noisiest[costs <= rays_left])
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,14 +208,6 @@ def _probes(job: _Job, error, seed) -> _Probes:
     gathered = (sums / PROBE_RAYS) @ LUMINANCE
     variance = variance + gathered.var(axis=1, ddof=1) / REPLICATES
     return _Probes(chosen, direct @ LUMINANCE + gathered.mean(axis=1), variance, shadow_rays + rays)
-
-
-def _affordable(active, relative, rays, take):
-    """Those of the receivers that a pass can afford, the noisiest first; in order."""
-    most = int(max(PASS_COST * rays, FREE_RAYS) / (take * REPLICATES))
-    if len(active) <= most:
-        return active
-    return np.sort(active[np.argsort(-relative[active], kind="stable")[:most]])
 
 
 def _best_estimate(job, grid, means, direct, probes):
