@@ -32,9 +32,9 @@ class Report:
     patches, receivers : counts; a patch has two sides, an unknown each
     method, solver : what ran, after "auto" has chosen; ``choice`` says why
     residuals : the solver's residual after each step, relative to the first
-    estimated_error : local relative RMS error of the irradiance, sampling only (``error_covers`` says so)
+    estimated_error : local relative RMS error of the irradiance; ``error_covers`` says what it covers
     target_error : what was asked for
-    target_reached : False when the time limit came first
+    target_reached : False when the time limit or the budget of rays came first
     energy : the solver's flux balance
     warnings : one sentence each, with the object or material it names
     """
@@ -50,7 +50,7 @@ class Report:
     choice: str = ""
     residuals: tuple[float, ...] = ()
     estimated_error: float = 0.0
-    error_covers: str = "sampling of direct and gathered light, at the receivers"
+    error_covers: str = "noise and smoothing at the receivers; not the size of patches and texels"
     target_error: float = 0.0
     target_reached: bool = True
     energy: Energy = field(default_factory=Energy)
