@@ -16,9 +16,9 @@ REPLICATES = 4  # independent randomisations; their spread is the error estimate
 FIRST_RAYS = 8  # a replicate's rays in the first pass
 GROWTH = 4  # every further pass brings those that need it to so many times as many
 MOST_RAYS = 2048  # of a replicate
-MOST_COST = 8  # times the rays of the first pass that all passes may take, and FREE_RAYS at least
+MOST_COST = 3  # times the rays of the first pass that all passes may take, and FREE_RAYS at least
 FREE_RAYS = 1 << 26
-DIRECT_PASSES = 3  # each with four times the shadow rays of the one before, for the receivers that need it
+DIRECT_PASSES = 2  # each with four times the shadow rays of the one before, for the receivers that need it
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBES = 2048  # receivers at which the result is measured anew, to know its error
 PROBE_RAYS = 256  # of a replicate
@@ -111,7 +111,7 @@ def _direct_until(job: _Job, error, seed, on_step):
     samples = shadow_samples(error)
     direct, variance, rays = job.kernel.direct(job.solved.sources, job.receivers, samples, seed, on_step)
     for attempt in range(1, DIRECT_PASSES):
-        noisy = np.flatnonzero(np.sqrt(variance) > 0.5 * error * _scale(direct))
+        noisy = np.flatnonzero(np.sqrt(variance) > error * _scale(direct))
         if not len(noisy):
             break
         samples *= 4
