@@ -34,8 +34,8 @@ class Irradiance:
     ----------
     values : float32 (N, 3) E [W/m^2]
     relative_error : estimated RMS over receivers of the error over (E + 0.3 median E), luminance
-    target_reached : whether sampling met its target before the time limit
-    rays : {"direct": shadow rays, "gather": rays}
+    target_reached : whether sampling met its target within the time limit and its budget of rays
+    rays : {"direct": shadow rays, "gather": rays, "probe": rays that measure the error}
     """
 
     values: np.ndarray

@@ -26,8 +26,9 @@ class BakeSettings:
     ----------
     target : "lightmap" or "vertex"
     method : how form factors are estimated; "auto" is Monte Carlo
-    solver : "auto" picks by the number of patches and says what it picked
-    error : target of the local relative RMS error of the irradiance [1]
+    solver : "auto" is stochastic, or with hemicubes direct or progressive by the number of triangles; the report says
+        which it was
+    error : target of the local relative RMS error of the irradiance; missed, the report says so [1]
     time_limit : sampling stops after so many seconds, target reached or not [s]; None = no limit
     texels : lightmap size as a number of texels, about
     density : texels per metre; when given, it decides the size instead of ``texels`` [1/m]

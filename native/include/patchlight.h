@@ -243,7 +243,7 @@ pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_s
  *
  *   first, count   the range of receivers
  *   samples        shadow rays for a receiver on which all light is partly hidden; a receiver that sees
- *                  all or nothing of a light takes a quarter
+ *                  all or nothing of a light takes three eighths
  *   out_irradiance 3 per receiver, at the receiver's index
  *   out_variance   1 per receiver: variance of the irradiance's luminance, estimated
  *   out_rays       shadow rays traced
