@@ -14,7 +14,20 @@ MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
     *("settings", "scene", "textures", "emitters", "report", "workers", "kernel", "patches", "transport"),
-    *("solver", "receivers", "radiosity", "charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing"),
+    *(
+        "solver",
+        "receivers",
+        "texel_light",
+        "guides",
+        "radiosity",
+        "charts",
+        "cut",
+        "flatten",
+        "packing",
+        "unwrap",
+        "texels",
+        "smoothing",
+    ),
     *("gather", "lightmap", "bake"),
 )
 BLENDER = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "idprop"}

@@ -10,6 +10,7 @@ from .emitters import emitters_of
 from .gather import Irradiance, gather_irradiance
 from .kernel import KernelScene
 from .lightmap import Lightmap, assemble
+from .probes import seen_through_corners, seen_through_lightmap
 from .radiosity import Solved, solve_radiosity
 from .receivers import surface_receivers, vertex_receivers
 from .report import Report
@@ -55,11 +56,13 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
             progress.begin("texels")
             texel_map = texels(scene, charts)
             receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
-            grid = texel_grid(texel_map, receivers)
+            grid = texel_grid(scene, charts, texel_map, receivers)
+            seen = seen_through_lightmap(scene, charts, texel_map, settings.seed)
         else:
             progress.begin("texels")
             receivers, corner_means = vertex_receivers(scene, settings.smooth_angle_deg)
             grid = None
+            seen = seen_through_corners(scene, corner_means, settings.seed)
 
         progress.begin("solve")
         kernel = KernelScene(scene, workers)
@@ -68,7 +71,7 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
 
         progress.begin("gather")
         irradiance = gather_irradiance(
-            kernel, solved, receivers, grid, settings.error, settings.seed,
+            kernel, solved, receivers, grid, seen, settings.error, settings.seed,
             lambda: settings.time_limit is not None and progress.elapsed > settings.time_limit, progress.step,
         )  # fmt: skip
 
@@ -104,6 +107,7 @@ def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, l
         choice=solved.choice,
         residuals=solved.solution.residuals,
         estimated_error=irradiance.relative_error,
+        seen_error=irradiance.seen_error,
         target_error=settings.error,
         target_reached=irradiance.target_reached,
         energy=solved.solution.energy,

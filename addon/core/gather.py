@@ -7,23 +7,28 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .emitters import LUMINANCE
+from .guides import Guides, learn_guides, no_guides
 from .kernel import KernelScene
+from .probes import Measured, SeenPoints, chosen_receivers, scale_of
 from .radiosity import Solved
 from .receivers import Receivers
 from .smoothing import TexelGrid, smoothed
+from .texel_light import NO_TEXEL_LIGHT, TexelLight
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
-FIRST_RAYS = 8  # a replicate's rays in the first pass
+LOOK_RAYS = 4  # of a replicate, for the first look at the texels' light, which further rays then see
+NEAR = 10.0  # texels: rays that hit from nearer do not take a texel's light
+FIRST_RAYS = 8  # of a replicate, in the first pass
 GROWTH = 4  # every further pass brings those that need it to so many times as many
 MOST_RAYS = 2048  # of a replicate
 MOST_COST = 3  # times the rays of the first pass that all passes may take, and FREE_RAYS at least
 FREE_RAYS = 1 << 26
-DIRECT_PASSES = 2  # each with four times the shadow rays of the one before, for the receivers that need it
+DIRECT_PASSES = 3  # each with four times the shadow rays of the one before, for the receivers that need it
+DIRECT_SHARE = 0.5  # of the error that direct light may have
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
-PROBES = 2048  # receivers at which the result is measured anew, to know its error
-PROBE_RAYS = 256  # of a replicate
+PROBE_RAYS = 128  # of a replicate
+FURTHER = 2.0  # probes look so many times further before they take a texel's or a patch's light for what is there
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
-DARK = 0.3  # of the median irradiance: what is added to a receiver's own before its error is called relative
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +39,14 @@ class Irradiance:
     ----------
     values : float32 (N, 3) E [W/m^2]
     relative_error : estimated RMS over receivers of the error over (E + 0.3 median E), luminance
+    seen_error : the same at random points of the surfaces, looked up in the result as a viewer does
     target_reached : whether sampling met its target within the time limit and its budget of rays
     rays : {"direct": shadow rays, "gather": rays, "probe": rays that measure the error}
     """
 
     values: np.ndarray
     relative_error: float
+    seen_error: float
     target_reached: bool
     rays: dict[str, int]
 
@@ -56,16 +63,28 @@ class _Job:
     kernel: KernelScene
     solved: Solved
     receivers: Receivers
+    guides: Guides
+    texel_light: TexelLight = NO_TEXEL_LIGHT
 
     def part(self, chosen) -> _Job:
         """The same for some of the receivers."""
-        return replace(self, receivers=Receivers(*(array[chosen] for array in self.receivers.arrays())))
+        return replace(self, receivers=self.receivers.part(chosen), guides=self.guides.part(chosen))
+
+    def looking_further(self, factor) -> _Job:
+        """The same with less taken for granted of what rays hit."""
+        solved = replace(self.solved, patches=self.solved.patches.looking_further(factor))
+        return replace(self, solved=solved, texel_light=self.texel_light.looking_further(factor))
+
+    def direct(self, samples, seed, on_step=None):
+        return self.kernel.direct(self.solved.sources, self.receivers, samples, seed, on_step)
 
     def gather(self, selected, first, take, seed, sums, on_step=None) -> int:
         return self.kernel.gather(
             self.solved.patches,
-            self.solved.emitters,
+            self.texel_light,
+            self.solved.sources,
             self.receivers,
+            self.guides,
             selected,
             REPLICATES,
             first,
@@ -81,6 +100,7 @@ def gather_irradiance(
     solved: Solved,
     receivers: Receivers,
     grid: TexelGrid | None,
+    seen: SeenPoints,
     error: float,
     seed: int,
     is_late,
@@ -92,47 +112,80 @@ def gather_irradiance(
     ----------
     solved : the patches' reflected light, and what direct light is sampled from
     grid : the texels that the receivers are, over which gathered light is smoothed; None = no smoothing
+    seen : random points of the surfaces, at which the result is looked up
     error : target of the relative error of every receiver [1]
     is_late : () -> bool, whether the time limit has passed; the first pass is always finished
     on_step : (0..1) -> None
     """
     if not len(receivers):
-        return Irradiance(np.zeros((0, 3), np.float32), 0.0, True, {"direct": 0, "gather": 0})
-    job = _Job(kernel, solved, receivers)
+        return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, {"direct": 0, "gather": 0})
+    job = _Job(kernel, solved, receivers, no_guides(len(receivers)))
     direct, shadow_rays = _direct_until(job, error, seed, lambda done: on_step(0.25 * done))
-    probes = _probes(job, error, seed + 1)
-    values, rms, rays, in_time = _gather_until(job, grid, direct, probes, error, seed, is_late, on_step)
-    traced = {"direct": shadow_rays, "gather": rays, "probe": probes.rays}
-    return Irradiance(values, rms, in_time and rms <= error, traced)
+    looks = 0
+    if grid is not None:
+        job, looks = _with_texel_light(job, grid, direct, seed + 2, lambda done: on_step(0.25 + 0.15 * done))
+    guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
+    job = replace(job, guides=guides)
+    chosen = chosen_receivers(len(receivers))
+    probes = _measure(job.part(chosen), error, seed + 1)
+    values, rms, rays, in_time = _gather_until(job, grid, direct, chosen, probes, error, seed, is_late, on_step)
+    at_points = _measure(replace(job, receivers=seen.receivers, guides=no_guides(len(seen.receivers))), error, seed + 4)
+    shown = seen.look_up(values)
+    traced = {
+        "direct": shadow_rays,
+        "gather": looks + learning + rays,
+        "probe": probes.rays + at_points.rays,
+    }
+    return Irradiance(values, rms, at_points.error_of(shown, scale_of(shown)), in_time and rms <= error, traced)
+
+
+def _with_texel_light(job: _Job, grid: TexelGrid, direct, seed, on_step):
+    """The job whose rays see what a first look found on the texels, and the rays of that look."""
+    sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
+    rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, LOOK_RAYS, seed, sums, on_step)
+    gathered, _ = smoothed(job.kernel.workers, grid, job.receivers, sums / LOOK_RAYS)
+    radiosity = (grid.reflectance * (direct + gathered)).astype(np.float32)
+    return replace(job, texel_light=TexelLight(grid.uvs, grid.receivers, radiosity, NEAR * grid.spacing)), rays
+
+
+def _measure(job: _Job, error, seed) -> Measured:
+    """The light at a job's receivers, with many rays, that take little for granted."""
+    further = job.looking_further(FURTHER)
+    direct, variance, shadow_rays = further.direct(4 * shadow_samples(error), seed)
+    sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
+    rays = further.gather(np.arange(len(sums), dtype=np.uint32), 0, PROBE_RAYS, seed, sums)
+    gathered = (sums / PROBE_RAYS) @ LUMINANCE
+    variance = variance + gathered.var(axis=1, ddof=1) / REPLICATES
+    return Measured(direct @ LUMINANCE + gathered.mean(axis=1), variance, shadow_rays + rays)
 
 
 def _direct_until(job: _Job, error, seed, on_step):
     """Direct irradiance (N, 3), with more rays where an estimate is too noisy, and the rays."""
     samples = shadow_samples(error)
-    direct, variance, rays = job.kernel.direct(job.solved.sources, job.receivers, samples, seed, on_step)
+    direct, variance, rays = job.direct(samples, seed, on_step)
     for attempt in range(1, DIRECT_PASSES):
-        noisy = np.flatnonzero(np.sqrt(variance) > error * _scale(direct))
+        noisy = np.flatnonzero(np.sqrt(variance) > DIRECT_SHARE * error * scale_of(direct))
         if not len(noisy):
             break
         samples *= 4
-        again = job.kernel.direct(job.solved.sources, job.part(noisy).receivers, samples, seed + 1000 * attempt)
+        again = job.part(noisy).direct(samples, seed + 1000 * attempt)
         direct[noisy], variance[noisy] = again[:2]
         rays += again[2]
     return direct, rays
 
 
-def _gather_until(job: _Job, grid, direct, probes, error, seed, is_late, on_step):
+def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, is_late, on_step):
     """Irradiance (N, 3), its relative RMS error, the rays, and whether the time limit let all passes be made."""
     count = len(job.receivers)
     sums, taken = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64)
-    active, rays, budget, begin = np.arange(count, dtype=np.uint32), 0, 0, 0.25
+    active, rays, budget, begin = np.arange(count, dtype=np.uint32), 0, 0, 0.4
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
         rays += _gather_pass(job, active, taken, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
         begin += width
         budget = budget or max(MOST_COST * rays, FREE_RAYS)
-        values, relative, rms = _best_estimate(job, grid, sums / taken[:, None, None], direct, probes)
+        values, relative, rms = _best_estimate(job, grid, sums / taken[:, None, None], direct, chosen, probes)
         # once the whole is good enough, only what would show as a speckle goes on
         active = np.flatnonzero(relative > (error if rms > error else 2 * error))
         if not len(active) and rms > error:
@@ -175,42 +228,7 @@ def _affordable(active, relative, taken, rays_left):
     return np.sort(noisiest[costs <= rays_left])
 
 
-@dataclass(frozen=True, slots=True)
-class _Probes:
-    """Some receivers, measured with other and many more rays and without smoothing.
-
-    What a result differs from them there, less what they are uncertain by themselves, is its error: noise and smoothing
-    alike, by no assumption of the result's own.
-    """
-
-    chosen: np.ndarray  # (K,) receivers
-    luminance: np.ndarray  # (K,)
-    variance: np.ndarray  # (K,)
-    rays: int
-
-    def error(self, values) -> float:
-        """Relative RMS error of irradiance (N, 3)."""
-        scale = _scale(values)[self.chosen]
-        difference = values[self.chosen] @ LUMINANCE - self.luminance
-        # one wrong receiver counts as one, however wrong
-        squares = np.minimum((difference / scale) ** 2, 1.0) - np.minimum(self.variance / scale**2, 1.0)
-        return float(np.sqrt(max(squares.mean(), 0.0)))
-
-
-def _probes(job: _Job, error, seed) -> _Probes:
-    chosen = np.unique(np.linspace(0, len(job.receivers) - 1, PROBES).round().astype(np.uint32))
-    part = job.part(chosen)
-    direct, variance, shadow_rays = job.kernel.direct(
-        job.solved.sources, part.receivers, 4 * shadow_samples(error), seed
-    )
-    sums = np.zeros((len(chosen), REPLICATES, 3), np.float32)
-    rays = part.gather(np.arange(len(chosen), dtype=np.uint32), 0, PROBE_RAYS, seed, sums)
-    gathered = (sums / PROBE_RAYS) @ LUMINANCE
-    variance = variance + gathered.var(axis=1, ddof=1) / REPLICATES
-    return _Probes(chosen, direct @ LUMINANCE + gathered.mean(axis=1), variance, shadow_rays + rays)
-
-
-def _best_estimate(job, grid, means, direct, probes):
+def _best_estimate(job, grid, means, direct, chosen, probes):
     """Irradiance (N, 3), its relative noise (N,) and relative RMS error, from replicate means (N, R, 3).
 
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
@@ -223,17 +241,11 @@ def _best_estimate(job, grid, means, direct, probes):
     best = None
     for gathered, noise in estimates:
         values = (direct + gathered).astype(np.float32)
-        rms = probes.error(values)
+        scale = scale_of(values)
+        rms = probes.error_of(values[chosen], scale[chosen])
         if best is None or rms < best[2]:
-            relative = np.sqrt(noise) / _scale(values)
+            relative = np.sqrt(noise) / scale
             # what the probes find and the replicates do not, is taken to be spread as the noise is
-            stated = np.sqrt(np.mean(relative[probes.chosen] ** 2))
+            stated = np.sqrt(np.mean(relative[chosen] ** 2))
             best = values, relative * min(max(rms / max(stated, 1e-12), 1.0), MOST_DOUBT), rms
     return best
-
-
-def _scale(irradiance):
-    """What an error is relative to: the luminance, and a share of its median where that is dark, (N,) [W/m^2]."""
-    luminance = irradiance @ LUMINANCE
-    lit = luminance[luminance > 1e-4 * max(luminance.mean(), 1e-30)]
-    return luminance + DARK * (np.median(lit) if len(lit) else 1.0)

@@ -19,6 +19,8 @@ except ImportError as error:  # a source tree that has not been built, or a zip 
         f"Patchlight's native kernel cannot be loaded ({error}): install the zip of your platform, or run `make`"
     ) from error
 
+GUIDE_CELLS = 64  # PL_GUIDE_CELLS of native/include/patchlight.h
+
 LIBRARY_PATTERNS = {
     "linux": ("../embreex.libs/libembree4*.so*",),
     "win32": ("../embreex.libs/embree4*.dll", "embree4*.dll"),
@@ -127,17 +129,34 @@ class KernelScene:
         self.workers.each_range(int(first_rays[-1]), 1 << 16, call)
         return received, escaped[0]
 
-    def gather(self, solution, emitters, receivers, selected, replicates, first, count, seed, io_sums, on_step=None):
+    def learn_guides(self, solution, texel_light, emitters, receivers, members, first_members, rays, seed):
+        """Mean squares of what groups of receivers see through each cell, float32 (G, GUIDE_CELLS), and the rays."""
+        moments = np.empty((len(first_members) - 1, GUIDE_CELLS), np.float32)
+        seen, on_texels, lights, where = (x.arrays() for x in (solution, texel_light, emitters, receivers))
+
+        def call(start, stop):
+            return _kernel.learn_guides(
+                self._scene, self._patches, seen, on_texels, lights, where, members, first_members, start,
+                stop - start, rays, seed, moments,
+            )  # fmt: skip
+
+        return moments, sum(self.workers.each_range(len(moments), 64, call))
+
+    def gather(
+        self, solution, texel_light, emitters, receivers, guides, selected, replicates, first, count, seed, io_sums,
+        on_step=None,
+    ):  # fmt: skip
         """Add the radiosity that each selected receiver's rays see to io_sums, float32 (N, replicates, 3).
 
-        Returns the rays traced. ``solution`` is a radiosity.PatchSolution.
+        Returns the rays traced. ``solution`` is a radiosity.PatchSolution, ``guides`` a guides.Guides.
         """
-        field, lights, where = solution.arrays(), emitters.arrays(), receivers.arrays()
+        seen, on_texels, lights, where = (x.arrays() for x in (solution, texel_light, emitters, receivers))
+        guiding = guides.arrays()
 
         def call(start, stop):
             return _kernel.gather(
-                self._scene, self._patches, field, lights, where, selected[start:stop], replicates, first, count, seed,
-                io_sums,
+                self._scene, self._patches, seen, on_texels, lights, where, guiding, selected[start:stop], replicates,
+                first, count, seed, io_sums,
             )  # fmt: skip
 
         size = max(64, min(4096, (1 << 17) // (replicates * count)))

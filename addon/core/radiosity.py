@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .emitters import LUMINANCE, Emitters, with_sources
+from .guides import no_guides
 from .kernel import KernelScene
 from .patches import Patches, patch_size_for, patch_triangles, subdivide
 from .receivers import patch_receivers
 from .scene import Scene, exitance_from_radiance, radiance_from_exitance
 from .settings import BakeSettings
 from .solver import Solution, require_direct_size, solve_direct, solve_progressive, solve_stochastic
+from .texel_light import NO_TEXEL_LIGHT
 from .transport import form_factors
 
 EVEN, MIXED_SIDE, LIGHT = 0, 1, 2  # kinds of sides, as the kernel has them
@@ -25,11 +27,14 @@ PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 
 PATCH_SKY_RAYS = 4  # of each point
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 MIXED = 0.5  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
+LEAK = 0.02  # the same where part of the side is in shadow: what a wall keeps out must not come in along the floor
+SHADOW = 0.25  # of the brightest point of a side: darker ones are in shadow
 BRIGHT = 20.0  # times the median radiosity: brighter sides are sampled as lights, which few gather rays would find
 BRIGHT_SHARE = 0.005  # of all area that they may be: where much is bright, gather rays find it well
+BRIGHT_FLUX = 0.1  # of all flux that they must send out: every receiver pays for them
 CONFINED = 0.5  # a side of which fewer rays leave its reach lies in a gap
 OPENNESS_RAYS = 8
-REACH = 3.0  # patch sizes: nearer hits go on from the point hit
+REACH = 10.0  # patch sizes: nearer hits go on from the point hit
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,10 @@ class PatchSolution:
 
     def __len__(self) -> int:
         return len(self.reflectance)
+
+    def looking_further(self, factor: float) -> PatchSolution:
+        """The same for rays that go on from further away."""
+        return replace(self, reaches=np.float32(factor) * self.reaches)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +130,8 @@ def _side_kinds(patches, radiosity, spread):
     is_mixed = spread * patches.side_reflectance.mean(axis=1) > MIXED * (luminance + typical)
     is_bright = (luminance > BRIGHT * typical) & ~is_mixed & (patches.side_areas > 0)
     is_bright &= _brightest(luminance, patches.side_areas, BRIGHT_SHARE)
+    flux = luminance * patches.side_areas
+    is_bright &= flux[is_bright].sum() > BRIGHT_FLUX * flux.sum()
     return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
 
 
@@ -194,10 +205,16 @@ def _direct_on_patches(scene, kernel, patches: Patches, emitters, seed, on_step)
         values, _, traced = kernel.direct(emitters, receivers, min(points, PATCH_SHADOW_SAMPLES), seed)
         values = values.reshape(-1, 2, points, 3)
         irradiance[chosen] = values.mean(axis=2, dtype=np.float64)
-        spread[chosen] = np.ptp(values.mean(axis=3), axis=2)
+        spread[chosen] = _spread(values.mean(axis=3))
         rays += traced
         on_step(share)
     return irradiance.reshape(-1, 3), spread.ravel(), rays
+
+
+def _spread(values):
+    """How far direct light differs over points (..., S) of a side, in units of what is told by MIXED."""
+    spread = np.ptp(values, axis=-1)
+    return np.where(values.min(axis=-1) < SHADOW * values.max(axis=-1), MIXED / LEAK, 1.0) * spread
 
 
 def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):
@@ -221,7 +238,9 @@ def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):
         sums = np.zeros((len(receivers), 1, 3), np.float32)
         everyone = np.arange(len(receivers), dtype=np.uint32)
         count = PATCH_SKY_RAYS
-        rays += kernel.gather(black, emitters, receivers, everyone, 1, 0, count, seed, sums)
+        rays += kernel.gather(
+            black, NO_TEXEL_LIGHT, emitters, receivers, no_guides(len(receivers)), everyone, 1, 0, count, seed, sums
+        )
         irradiance[chosen] = (sums[:, 0] / count).reshape(-1, 2, points, 3).mean(axis=2, dtype=np.float64)
     return irradiance.reshape(-1, 3), rays
 

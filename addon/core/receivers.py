@@ -35,6 +35,10 @@ class Receivers:
         """In the kernel's order."""
         return self.positions, self.normals, self.triangle_sides
 
+    def part(self, chosen) -> Receivers:
+        """Some of them."""
+        return Receivers(*(array[chosen] for array in self.arrays()))
+
 
 def surface_receivers(scene: Scene, triangles, barycentrics) -> Receivers:
     """Receivers on the fronts of triangles (N,) at barycentrics (N, 3)."""

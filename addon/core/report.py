@@ -32,7 +32,9 @@ class Report:
     patches, receivers : counts; a patch has two sides, an unknown each
     method, solver : what ran, after "auto" has chosen; ``choice`` says why
     residuals : the solver's residual after each step, relative to the first
-    estimated_error : local relative RMS error of the irradiance; ``error_covers`` says what it covers
+    estimated_error : local relative RMS error of the irradiance at the receivers, which more rays make smaller
+    seen_error : the same at random points of the surfaces, looked up in the result as a viewer does: with the size of
+        texels, or the distance of vertices, and of patches
     target_error : what was asked for
     target_reached : False when the time limit or the budget of rays came first
     energy : the solver's flux balance
@@ -50,7 +52,8 @@ class Report:
     choice: str = ""
     residuals: tuple[float, ...] = ()
     estimated_error: float = 0.0
-    error_covers: str = "noise and smoothing at the receivers; not the size of patches and texels"
+    seen_error: float = 0.0
+    error_covers: str = "estimated_error: noise and smoothing at the receivers; seen_error: texel size and patches, too"
     target_error: float = 0.0
     target_reached: bool = True
     energy: Energy = field(default_factory=Energy)

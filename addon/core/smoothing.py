@@ -10,10 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .charts import Charts
 from .emitters import LUMINANCE
 from .kernel import smooth
 from .receivers import Receivers
+from .scene import Scene
 from .texels import TexelMap
+from .textures import textured_colours
 from .workers import Workers
 
 STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
@@ -27,20 +30,26 @@ class TexelGrid:
     ----------
     receivers : int32 (height, width), -1 for none
     spacing : distance of neighbouring texels in space, the median [m]
+    uvs : float32 (T, 3, 2) of the scene's triangles' corners, in texels; NaN without a place
+    reflectance : float32 (N, 3) of the receivers
     """
 
     receivers: np.ndarray
     spacing: float
+    uvs: np.ndarray
+    reflectance: np.ndarray
 
 
-def texel_grid(texel_map: TexelMap, receivers: Receivers) -> TexelGrid:
+def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Receivers) -> TexelGrid:
     """The grid that a lightmap's receivers lie in."""
     grid = np.full((texel_map.height, texel_map.width), -1, np.int32)
     grid[texel_map.rows, texel_map.columns] = np.arange(len(texel_map))
     beside = (np.diff(texel_map.rows) == 0) & (np.diff(texel_map.columns) == 1)
     apart = np.linalg.norm(np.diff(receivers.positions, axis=0)[beside], axis=1)
     apart = apart[apart > 0]
-    return TexelGrid(grid, float(np.median(apart)) if len(apart) else 1.0)
+    spacing = float(np.median(apart)) if len(apart) else 1.0
+    colours = textured_colours(scene, texel_map.triangles, texel_map.barycentrics, "reflectance", "reflectance_texture")
+    return TexelGrid(grid, spacing, charts.uvs, np.clip(colours, 0, 1))
 
 
 def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means):

@@ -217,9 +217,61 @@ typedef struct pl_solution {
 } pl_solution;
 
 /*
+ * The light on a lightmap's own texels, once it is about known: finer than any patch.
+ *
+ *   uvs        6 per triangle of the scene: corners in texels, as in pl_rasterise_texels; NaN without a place
+ *   receivers  width * height: which receiver each texel is, -1 for none
+ *   radiosity  3 per receiver: reflected radiosity
+ *   reach      rays that hit from nearer [m] do not take a texel's light, which may lie half under something, but go on
+ */
+typedef struct pl_texel_light {
+    const float *uvs;
+    const int32_t *receivers;
+    int32_t width, height;
+    const float *radiosity;
+    float reach;
+} pl_texel_light;
+
+/* What gather rays travel through, and what they see there; `lights` as in pl_direct, for the sides that are mixed. */
+typedef struct pl_gather_scene {
+    const pl_scene *scene;
+    const pl_patches *patches;
+    const pl_solution *solution;
+    const pl_texel_light *texels; /* NULL: none is known yet */
+    const pl_lights *lights;
+} pl_gather_scene;
+
+/*
+ * Where light comes from, for groups of neighbouring receivers: their rays are drawn more often from there, and
+ * count for less (importance sampling; Jensen 1995, "Importance driven path tracing using the photon map").
+ *
+ *   groups  one per receiver: its group, or -1 for plain cosine rays
+ *   shares  PL_GUIDE_CELLS per group, above 0, sum 1: how often rays leave through each cell of the unit square
+ *           that cosine rays are drawn from, in rows of the polar coordinate
+ */
+enum { PL_GUIDE_SIDE = 8, PL_GUIDE_CELLS = PL_GUIDE_SIDE * PL_GUIDE_SIDE };
+typedef struct pl_guides {
+    const int32_t *groups;
+    const float *shares;
+    size_t group_count;
+} pl_guides;
+
+/*
+ * Mean square of the radiosity's luminance that plain cosine rays see through each cell: what guides are made from.
+ *
+ *   members, first_members  group g's receivers are members[first_members[g] .. first_members[g + 1] - 1]
+ *   first, count            the range of groups
+ *   rays                    of each member
+ *   out_moments             PL_GUIDE_CELLS per group, at the group's index
+ */
+pl_status pl_learn_guides(const pl_gather_scene *in, const pl_receivers *receivers, const uint32_t *members,
+                          const uint32_t *first_members, size_t first, size_t count, uint32_t rays, uint32_t seed,
+                          float *out_moments, uint64_t *out_rays);
+
+/*
  * Irradiance by gathering: the mean radiosity that cosine rays see (final gather).
  *
- *   lights         as in pl_direct, for the sides that are mixed
+ *   guides         where rays are drawn from
  *   selected       count indices into the receivers; the sequence of a receiver hangs on its index only
  *   replicates     independent randomisations, 1..PL_MAX_REPLICATES; their spread is the error estimate
  *   first, count   each replicate takes points first .. first + count - 1 of its Sobol sequence; powers
@@ -234,9 +286,8 @@ typedef struct pl_gather_rays {
     uint32_t count;
     uint32_t seed;
 } pl_gather_rays;
-pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
-                    const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected, size_t count,
-                    pl_gather_rays rays, float *io_sums, uint64_t *out_rays);
+pl_status pl_gather(const pl_gather_scene *in, const pl_receivers *receivers, const pl_guides *guides,
+                    const uint32_t *selected, size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays);
 
 /*
  * Direct irradiance from the lights: shadow rays, emitters chosen by what they would give unoccluded.

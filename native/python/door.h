@@ -10,6 +10,11 @@
 
 #include <stdbool.h>
 
+/* What the capsules hold. */
+#define EMBREE "patchlight.embree"
+#define SCENE "patchlight.scene"
+#define PATCHES "patchlight.patches"
+
 /*
  * One array argument: its name for messages, its type as the buffer protocol spells it ('f' float32, 'd' float64,
  * 'i' int32, 'I' uint32, 'Q' uint64, 'B' uint8), numbers per row, rows expected (-1: any, AS_MANY_ROWS_AS(k): as the
@@ -36,5 +41,11 @@ bool door_has_numbers(const door_array *array, size_t count);
 
 /* NULL with the exception that the status means; None for PL_OK. */
 PyObject *door_result(pl_status status);
+
+/* Functions with a file of their own: light.c. */
+PyObject *door_learn_guides(PyObject *self, PyObject *args);
+PyObject *door_gather(PyObject *self, PyObject *args);
+PyObject *door_direct(PyObject *self, PyObject *args);
+PyObject *door_smooth(PyObject *self, PyObject *args);
 
 #endif

@@ -4,8 +4,6 @@
  */
 #include "door.h"
 
-static const char EMBREE[] = "patchlight.embree", SCENE[] = "patchlight.scene", PATCHES[] = "patchlight.patches";
-
 /* A capsule keeps what it was made from alive by its context. */
 static void drop_parent(PyObject *capsule) { Py_XDECREF((PyObject *)PyCapsule_GetContext(capsule)); }
 
@@ -262,155 +260,6 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
     Py_RETURN_NONE;
 }
 
-/* The five arrays of a light table, as every function that samples lights takes them. */
-#define LIGHT_ARRAYS(at)                                                                                               \
-    {"light_kinds", 'i', 1, -1, false, {0}},                                                                           \
-        {"light_parameters", 'f', PL_LIGHT_FLOATS, AS_MANY_ROWS_AS(at), false, {0}},                                   \
-        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 6, AS_MANY_ROWS_AS((at) + 2), false, {0}}, \
-    {                                                                                                                  \
-        "light_cumulative", 'f', 1, AS_MANY_ROWS_AS((at) + 2), false, {0}                                              \
-    }
-#define RECEIVER_ARRAYS(at)                                                                                            \
-    {"positions", 'd', 3, -1, false, {0}}, {"normals", 'f', 3, AS_MANY_ROWS_AS(at), false, {0}}, {                     \
-        "triangle_sides", 'i', 1, AS_MANY_ROWS_AS(at), false, {0}                                                      \
-    }
-enum { LIGHT_ARRAY_COUNT = 5, RECEIVER_ARRAY_COUNT = 3 };
-
-static pl_lights lights_of(const door_array *arrays) {
-    return (pl_lights){arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
-                       arrays[3].view.buf, arrays[4].view.buf, door_rows(&arrays[4])};
-}
-
-static pl_receivers receivers_of(const door_array *arrays) {
-    return (pl_receivers){arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf, door_rows(&arrays[0])};
-}
-
-/* Items of a tuple argument into objects[0..count); false with an exception if it is no tuple of that many. */
-static bool unpack(PyObject *tuple, Py_ssize_t count, PyObject **out_objects) {
-    if (!PyTuple_Check(tuple) || PyTuple_Size(tuple) != count) {
-        PyErr_Format(PyExc_TypeError, "expected a tuple of %zd arrays", count);
-        return false;
-    }
-    for (Py_ssize_t i = 0; i < count; ++i)
-        out_objects[i] = PyTuple_GetItem(tuple, i);
-    return true;
-}
-
-static PyObject *gather(PyObject *self, PyObject *args) {
-    enum {
-        FIELDS = 6,
-        LIGHTS = FIELDS,
-        RECEIVERS = LIGHTS + LIGHT_ARRAY_COUNT,
-        SELECTED = RECEIVERS + RECEIVER_ARRAY_COUNT,
-        SUMS,
-        ARRAYS
-    };
-    PyObject *capsules[2], *solution_arrays, *light_arrays, *receiver_arrays, *objects[ARRAYS];
-    pl_gather_rays rays;
-    uint64_t traced = 0;
-    pl_status status;
-    (void)self;
-    if (!PyArg_ParseTuple(args, "OOOOOOIIIIO", &capsules[0], &capsules[1], &solution_arrays, &light_arrays,
-                          &receiver_arrays, &objects[SELECTED], &rays.replicates, &rays.first, &rays.count, &rays.seed,
-                          &objects[SUMS]))
-        return NULL;
-    const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
-    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
-    door_array arrays[] = {{"radiosity", 'f', 3, sides, false, {0}},
-                           {"direct", 'f', 3, sides, false, {0}},
-                           {"reflectance", 'f', 3, sides / 2, false, {0}},
-                           {"kinds", 'B', 1, sides, false, {0}},
-                           {"reaches", 'f', 1, sides, false, {0}},
-                           {"sky", 'f', 3, 1, false, {0}},
-                           LIGHT_ARRAYS(LIGHTS),
-                           RECEIVER_ARRAYS(RECEIVERS),
-                           {"selected", 'I', 1, -1, false, {0}},
-                           {"io_sums", 'f', 3, -1, true, {0}}};
-    if (!patches || !unpack(solution_arrays, FIELDS, objects) ||
-        !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects + LIGHTS) ||
-        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) || !door_arrays(objects, arrays, ARRAYS))
-        return NULL;
-    if (!door_has_numbers(&arrays[SUMS], 3 * (size_t)rays.replicates * door_rows(&arrays[RECEIVERS]))) {
-        door_release(arrays, ARRAYS);
-        return NULL;
-    }
-    const float *sky = arrays[5].view.buf;
-    const pl_solution solution = {arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf,
-                                  arrays[3].view.buf, arrays[4].view.buf, {sky[0], sky[1], sky[2]}};
-    const pl_lights lights = lights_of(arrays + LIGHTS);
-    const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
-
-    Py_BEGIN_ALLOW_THREADS
-    status = pl_gather(scene, patches, &solution, &lights, &receivers, arrays[SELECTED].view.buf,
-                       door_rows(&arrays[SELECTED]), rays, arrays[SUMS].view.buf, &traced);
-    Py_END_ALLOW_THREADS
-
-    door_release(arrays, ARRAYS);
-    return status == PL_OK ? PyLong_FromUnsignedLongLong(traced) : door_result(status);
-}
-
-static PyObject *direct(PyObject *self, PyObject *args) {
-    enum { RECEIVERS = LIGHT_ARRAY_COUNT, IRRADIANCE = RECEIVERS + RECEIVER_ARRAY_COUNT, VARIANCE, ARRAYS };
-    PyObject *capsule, *light_arrays, *receiver_arrays, *objects[ARRAYS];
-    Py_ssize_t first, count;
-    unsigned samples, seed;
-    uint64_t rays = 0;
-    pl_status status;
-    (void)self;
-    if (!PyArg_ParseTuple(args, "OOOnnIIOO", &capsule, &light_arrays, &receiver_arrays, &first, &count, &samples, &seed,
-                          &objects[IRRADIANCE], &objects[VARIANCE]))
-        return NULL;
-    const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
-    door_array arrays[] = {LIGHT_ARRAYS(0),
-                           RECEIVER_ARRAYS(RECEIVERS),
-                           {"out_irradiance", 'f', 3, AS_MANY_ROWS_AS(RECEIVERS), true, {0}},
-                           {"out_variance", 'f', 1, AS_MANY_ROWS_AS(RECEIVERS), true, {0}}};
-    if (!scene || !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects) ||
-        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) || !door_arrays(objects, arrays, ARRAYS))
-        return NULL;
-    const pl_lights lights = lights_of(arrays);
-    const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
-
-    Py_BEGIN_ALLOW_THREADS
-    status = pl_direct(scene, &lights, &receivers, (size_t)first, (size_t)count, samples, seed,
-                       arrays[IRRADIANCE].view.buf, arrays[VARIANCE].view.buf, &rays);
-    Py_END_ALLOW_THREADS
-
-    door_release(arrays, ARRAYS);
-    return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
-}
-
-static PyObject *smooth(PyObject *self, PyObject *args) {
-    enum { VALUES = RECEIVER_ARRAY_COUNT + 1, VARIANCES, OUT_VALUES, OUT_VARIANCES, ARRAYS };
-    PyObject *receiver_arrays, *objects[ARRAYS];
-    pl_texel_grid grid;
-    int step, stops_on_value, first_row, row_count;
-    (void)self;
-    if (!PyArg_ParseTuple(args, "OiifOOOiiiiOO", &objects[RECEIVER_ARRAY_COUNT], &grid.width, &grid.height,
-                          &grid.spacing, &receiver_arrays, &objects[VALUES], &objects[VARIANCES], &step,
-                          &stops_on_value, &first_row, &row_count, &objects[OUT_VALUES], &objects[OUT_VARIANCES]))
-        return NULL;
-    door_array arrays[] = {RECEIVER_ARRAYS(0),
-                           {"grid", 'i', 1, (Py_ssize_t)grid.width * grid.height, false, {0}},
-                           {"values", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
-                           {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
-                           {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}},
-                           {"out_variances", 'f', 1, AS_MANY_ROWS_AS(0), true, {0}}};
-    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS))
-        return NULL;
-    const pl_receivers receivers = receivers_of(arrays);
-    grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
-
-    Py_BEGIN_ALLOW_THREADS
-    pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value, first_row,
-              row_count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
-    Py_END_ALLOW_THREADS
-
-    door_release(arrays, ARRAYS);
-    Py_RETURN_NONE;
-}
-
 static PyObject *rasterise_texels(PyObject *self, PyObject *args) {
     PyObject *objects[4];
     int width, height;
@@ -478,11 +327,15 @@ static PyMethodDef methods[] = {
     {"shoot", shoot, METH_VARARGS,
      "shoot(scene, patches, first_rays, first_samples, ray_flux, first, count, seed, io_received, "
      "io_escaped)"},
-    {"gather", gather, METH_VARARGS,
-     "gather(scene, patches, solution, lights, receivers, selected, replicates, first, count, seed, io_sums) -> rays"},
-    {"direct", direct, METH_VARARGS,
+    {"gather", door_gather, METH_VARARGS,
+     "gather(scene, patches, solution, lights, receivers, guides, selected, replicates, first, count, seed, io_sums) "
+     "-> rays"},
+    {"learn_guides", door_learn_guides, METH_VARARGS,
+     "learn_guides(scene, patches, solution, lights, receivers, members, first_members, first, count, rays, seed, "
+     "out_moments) -> rays"},
+    {"direct", door_direct, METH_VARARGS,
      "direct(scene, lights, receivers, first, count, samples, seed, out_irradiance, out_variance) -> rays"},
-    {"smooth", smooth, METH_VARARGS,
+    {"smooth", door_smooth, METH_VARARGS,
      "smooth(grid, width, height, spacing, receivers, values, variances, step, stops_on_value, first_row, "
      "row_count, out_values, out_variances)"},
     {"rasterise_texels", rasterise_texels, METH_VARARGS,

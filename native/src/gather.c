@@ -7,6 +7,7 @@
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
 #include "direct.h"
+#include "guide.h"
 #include "patches.h"
 
 #include <stdlib.h>
@@ -17,6 +18,7 @@ typedef struct gather_job {
     const pl_scene *scene;
     const pl_patches *patches;
     const pl_solution *solution;
+    const pl_texel_light *texels;
     const pl_lights *lights;
     pl_light_balls balls;
     float *importances; /* room for one number a light */
@@ -56,21 +58,36 @@ static vec3 hit_normal(const pl_scene *scene, const pl_hit *hit, size_t side) {
     return vec3_scale(scene_normal(scene, hit->triangle), side & 1 ? -1.0f : 1.0f);
 }
 
-/* Direct light that a side reflects at the point hit: its mean, or sampled anew where it is mixed. */
-static void reflect_direct(gather_job *job, const pl_hit *hit, size_t side, ray_random *random, const float *weight,
-                           float *io_sum) {
-    const pl_solution *solution = job->solution;
-    if (solution->kinds[side] != PL_SIDE_MIXED) {
-        add(io_sum, solution->direct + 3 * side, weight);
-        return;
-    }
+/* The lights' own light that a side reflects at the point hit, sampled there. */
+static void sample_direct(gather_job *job, const pl_hit *hit, size_t side, ray_random *random, const float *weight,
+                          float *io_sum) {
     const vec3 normal = hit_normal(job->scene, hit, side);
     const float numbers[3] = {draw(random), draw(random), draw(random)};
     float rgb[3];
     job->rays += direct_at_point(job->scene, job->lights, &job->balls, job->importances,
                                  hit_point(job->scene, hit, normal), normal, numbers, rgb);
     for (int k = 0; k < 3; ++k)
-        io_sum[k] += rgb[k] * weight[k] * solution->reflectance[3 * (side / 2) + (size_t)k];
+        io_sum[k] += rgb[k] * weight[k] * job->solution->reflectance[3 * (side / 2) + (size_t)k];
+}
+
+/* The radiosity of the texel that a ray hits the front of; NULL where there is none. */
+static const float *texel_hit(const pl_texel_light *texels, const pl_hit *hit) {
+    if (!texels || hit->is_back)
+        return NULL;
+    const float *uv = texels->uvs + 6 * (size_t)hit->triangle;
+    const float u = uv[0] + hit->u * (uv[2] - uv[0]) + hit->v * (uv[4] - uv[0]);
+    const float v = uv[1] + hit->u * (uv[3] - uv[1]) + hit->v * (uv[5] - uv[1]);
+    if (!(u >= 0 && v >= 0 && u < (float)texels->width && v < (float)texels->height))
+        return NULL;
+    const int32_t receiver = texels->receivers[(size_t)v * (size_t)texels->width + (size_t)u];
+    return receiver < 0 ? NULL : texels->radiosity + 3 * (size_t)receiver;
+}
+
+static bool is_far(const gather_job *job, const pl_hit *hit, size_t side) {
+    return hit->distance >= job->solution->reaches[side];
+}
+static bool take_patch(const gather_job *job, const pl_hit *hit, size_t side, bool is_last) {
+    return is_last || (is_far(job, hit, side) && job->solution->kinds[side] != PL_SIDE_MIXED);
 }
 
 /* Add what one ray sees to the sum. */
@@ -93,13 +110,18 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
                                                           : hit_side(job->patches, &hit);
         if (step == 0 && solution->kinds[side] == PL_SIDE_LIGHT)
             return;
-        const bool is_far = hit.distance >= solution->reaches[side] || step == MOST_STEPS - 1;
-        if (is_far && solution->kinds[side] != PL_SIDE_MIXED) {
-            add(io_sum, solution->radiosity + 3 * side, weight);
+        const float *seen = texel_hit(job->texels, &hit);
+        const bool is_last = step == MOST_STEPS - 1;
+        if (seen ? hit.distance >= job->texels->reach || is_last : take_patch(job, &hit, side, is_last)) {
+            add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
             return;
         }
-        reflect_direct(job, &hit, side, &random, weight, io_sum);
-        if (is_far) {
+        const bool is_mixed = seen || solution->kinds[side] == PL_SIDE_MIXED;
+        if (is_mixed)
+            sample_direct(job, &hit, side, &random, weight, io_sum);
+        else
+            add(io_sum, solution->direct + 3 * side, weight);
+        if (!seen && is_far(job, &hit, side)) {
             for (size_t k = 3 * side; k < 3 * side + 3; ++k)
                 io_sum[k - 3 * side] += weight[k - 3 * side] * (solution->radiosity[k] - solution->direct[k]);
             return;
@@ -123,33 +145,94 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
     }
 }
 
-pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_solution *solution,
-                    const pl_lights *lights, const pl_receivers *receivers, const uint32_t *selected, size_t count,
-                    pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
+static pl_status begin(gather_job *job, const pl_gather_scene *in, const pl_receivers *receivers,
+                       const uint32_t *selected, size_t count) {
     for (size_t i = 0; i < count; ++i)
-        if (!receiver_is_valid(scene, receivers, selected[i]))
+        if (!receiver_is_valid(in->scene, receivers, selected[i]))
             return PL_ERR_ARGUMENT;
-    gather_job job = {.scene = scene, .patches = patches, .solution = solution, .lights = lights};
-    job.importances = malloc(sizeof(float) * (lights->count + 1));
-    if (!job.importances || !light_balls_create(lights, &job.balls)) {
-        free(job.importances);
+    *job = (gather_job){.scene = in->scene,
+                        .patches = in->patches,
+                        .solution = in->solution,
+                        .texels = in->texels,
+                        .lights = in->lights};
+    job->importances = malloc(sizeof(float) * (in->lights->count + 1));
+    if (!job->importances || !light_balls_create(in->lights, &job->balls)) {
+        free(job->importances);
         return PL_ERR_MEMORY;
     }
+    return PL_OK;
+}
+
+static void end(gather_job *job) {
+    light_balls_destroy(&job->balls);
+    free(job->importances);
+}
+
+pl_status pl_gather(const pl_gather_scene *in, const pl_receivers *receivers, const pl_guides *guides,
+                    const uint32_t *selected, size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
+    gather_job job;
+    const pl_status status = begin(&job, in, receivers, selected, count);
+    if (status != PL_OK)
+        return status;
     for (size_t i = 0; i < count; ++i) {
-        const pl_receiver_frame frame = receiver_frame(scene, receivers, selected[i]);
+        const pl_receiver_frame frame = receiver_frame(in->scene, receivers, selected[i]);
+        const guide by = guide_of(guides, selected[i]);
         vec3 u, v;
         vec3_basis(frame.shading, &u, &v);
         for (uint32_t replicate = 0; replicate < rays.replicates; ++replicate) {
             const uint32_t seed = hash_pair(hash_pair(rays.seed, replicate), selected[i]);
             float *sum = io_sums + 3 * ((size_t)selected[i] * rays.replicates + replicate);
             for (uint32_t k = rays.first; k < rays.first + rays.count; ++k) {
-                const vec3 direction = cosine_direction(sobol(k, 0, seed), sobol(k, 1, seed), u, v, frame.shading);
-                gather_ray(&job, &frame, direction, (ray_random){hash_pair(seed, k), 0}, sum);
+                float x = sobol(k, 0, seed), y = sobol(k, 1, seed), seen[3] = {0, 0, 0};
+                const float share = guide_warp(&by, &x, &y), weight[3] = {share, share, share};
+                gather_ray(&job, &frame, cosine_direction(x, y, u, v, frame.shading),
+                           (ray_random){hash_pair(seed, k), 0}, seen);
+                add(sum, seen, weight);
             }
         }
     }
     *out_rays = job.rays;
-    light_balls_destroy(&job.balls);
-    free(job.importances);
+    end(&job);
+    return PL_OK;
+}
+
+/* What one receiver's rays see, squared, added to the cells that they leave through. */
+static void learn(gather_job *job, const pl_receivers *receivers, uint32_t receiver, uint32_t rays, uint32_t seed,
+                  float *io_moments, uint32_t *io_counts) {
+    const pl_receiver_frame frame = receiver_frame(job->scene, receivers, receiver);
+    const uint32_t own_seed = hash_pair(seed, receiver);
+    vec3 u, v;
+    vec3_basis(frame.shading, &u, &v);
+    for (uint32_t k = 0; k < rays; ++k) {
+        const float x = sobol(k, 0, own_seed), y = sobol(k, 1, own_seed);
+        float seen[3] = {0, 0, 0};
+        gather_ray(job, &frame, cosine_direction(x, y, u, v, frame.shading), (ray_random){hash_pair(own_seed, k), 0},
+                   seen);
+        const float light = luminance(seen);
+        io_moments[guide_cell(x, y)] += light * light;
+        ++io_counts[guide_cell(x, y)];
+    }
+}
+
+pl_status pl_learn_guides(const pl_gather_scene *in, const pl_receivers *receivers, const uint32_t *members,
+                          const uint32_t *first_members, size_t first, size_t count, uint32_t rays, uint32_t seed,
+                          float *out_moments, uint64_t *out_rays) {
+    gather_job job;
+    const uint32_t begin_member = first_members[first], end_member = first_members[first + count];
+    const pl_status status = begin(&job, in, receivers, members + begin_member, end_member - begin_member);
+    if (status != PL_OK)
+        return status;
+    for (size_t group = first; group < first + count; ++group) {
+        float *moments = out_moments + PL_GUIDE_CELLS * group;
+        uint32_t counts[PL_GUIDE_CELLS] = {0};
+        for (int cell = 0; cell < PL_GUIDE_CELLS; ++cell)
+            moments[cell] = 0;
+        for (uint32_t m = first_members[group]; m < first_members[group + 1]; ++m)
+            learn(&job, receivers, members[m], rays, seed, moments, counts);
+        for (int cell = 0; cell < PL_GUIDE_CELLS; ++cell)
+            moments[cell] /= (float)(counts[cell] ? counts[cell] : 1);
+    }
+    *out_rays = job.rays;
+    end(&job);
     return PL_OK;
 }

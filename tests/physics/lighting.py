@@ -4,6 +4,7 @@ import numpy as np
 
 from addon.core.emitters import emitters_of
 from addon.core.gather import gather_irradiance
+from addon.core.probes import SeenPoints
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
 from addon.core.settings import BakeSettings
@@ -50,6 +51,7 @@ def full_light(scene, receivers, threads=2, **settings):
             solved=solved,
             receivers=receivers,
             grid=None,
+            seen=SeenPoints(receivers, lambda values: values),
             error=settings.error,
             seed=settings.seed,
             is_late=lambda: False,

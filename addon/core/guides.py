@@ -1,0 +1,107 @@
+"""Guides: where light comes from, learned for groups of neighbouring receivers, so that their rays go there.
+
+An interior is lit through a window, by a sunlit floor, from under a shade: most plain cosine rays find little, and what
+few find much is the noise. Neighbours see nearly the same, so a few of them look for all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .kernel import GUIDE_CELLS, KernelScene
+from .receivers import Receivers
+
+GROUP = 256  # receivers that share a guide
+LEARNERS = 32  # of a group, that look for all
+LEARNING_RAYS = 32  # of each
+EVEN = 0.25  # of the rays go everywhere alike: what the learners missed keeps a bounded weight
+NORMAL_CELLS = 3  # each axis of a normal is cut into so many: receivers that look elsewhere are no neighbours
+
+
+@dataclass(frozen=True, slots=True)
+class Guides:
+    """How often rays leave through each cell of the square that they are drawn from.
+
+    Attributes
+    ----------
+    groups : int32 (N,) the receivers' groups, -1 = plain cosine rays
+    shares : float32 (G, GUIDE_CELLS) above 0, sum 1
+    """
+
+    groups: np.ndarray
+    shares: np.ndarray
+
+    def arrays(self) -> tuple:
+        """In the kernel's order."""
+        return self.groups, self.shares
+
+    def part(self, chosen) -> Guides:
+        """The same for some of the receivers."""
+        return Guides(self.groups[chosen], self.shares)
+
+
+def no_guides(count: int) -> Guides:
+    """Plain cosine rays for ``count`` receivers."""
+    return Guides(np.full(count, -1, np.int32), np.zeros((0, GUIDE_CELLS), np.float32))
+
+
+def learn_guides(
+    kernel: KernelScene, solution, texel_light, emitters, receivers: Receivers, seed: int
+) -> tuple[Guides, int]:
+    """Guides for receivers, and the rays that it took to learn them."""
+    order, firsts = _neighbours(receivers)
+    groups = np.empty(len(receivers), np.int32)
+    groups[order] = np.repeat(np.arange(len(firsts) - 1, dtype=np.int32), np.diff(firsts))
+    members, first_members = _learners(order, firsts)
+    moments, rays = kernel.learn_guides(
+        solution, texel_light, emitters, receivers, members, first_members, LEARNING_RAYS, seed
+    )
+    return Guides(groups, _shares(moments)), rays
+
+
+def _shares(moments):
+    """The density that makes the variance least is the root of the mean square [Kahn & Marshall 1953]."""
+    roots = np.sqrt(moments.astype(np.float64))
+    total = roots.sum(axis=1, keepdims=True)
+    found = np.where(total > 0, roots / np.maximum(total, 1e-300), 1 / GUIDE_CELLS)
+    return ((1 - EVEN) * found + EVEN / GUIDE_CELLS).astype(np.float32)
+
+
+def _neighbours(receivers):
+    """Receivers in an order in which neighbours are near, and where each group starts in it, (G + 1,)."""
+    low = receivers.positions.min(axis=0, initial=np.inf)
+    extent = max(float(np.ptp(receivers.positions, axis=0).max()), 1e-30)
+    cells = np.clip((receivers.positions - low) / extent * 1023, 0, 1023).astype(np.uint64)
+    facing = np.clip((receivers.normals + 1) * (0.5 * NORMAL_CELLS), 0, NORMAL_CELLS - 1).astype(np.uint64)
+    way = (facing[:, 0] * NORMAL_CELLS + facing[:, 1]) * NORMAL_CELLS + facing[:, 2]
+    place = (
+        _spread_bits(cells[:, 0])
+        | _spread_bits(cells[:, 1]) << np.uint64(1)
+        | _spread_bits(cells[:, 2]) << np.uint64(2)
+    )
+    order = np.argsort(way << np.uint64(30) | place, kind="stable")
+    # a group ends where its receivers look elsewhere, or when it is full
+    starts = np.flatnonzero(np.diff(way[order], prepend=way[order][:1] + np.uint64(1)))
+    ends = np.append(starts[1:], len(order))
+    firsts = [np.arange(start, end, GROUP) for start, end in zip(starts, ends)]
+    return order, np.append(np.concatenate(firsts), len(order))
+
+
+def _spread_bits(x):
+    """Ten bits to every third place (Morton 1966)."""
+    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
+        x = (x | x << np.uint64(shift)) & np.uint64(mask)
+    return x
+
+
+def _learners(order, firsts):
+    """Some receivers of each group, evenly through it: their indices, and where each group's start."""
+    sizes = np.diff(firsts)
+    counts = np.minimum(sizes, LEARNERS)
+    first_members = np.append(0, np.cumsum(counts))
+    group = np.repeat(np.arange(len(sizes)), counts)
+    place = np.arange(first_members[-1]) - first_members[group]
+    members = order[firsts[group] + place * sizes[group] // counts[group]]
+    return members.astype(np.uint32), first_members.astype(np.uint32)

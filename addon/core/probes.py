@@ -1,0 +1,124 @@
+"""Probes: points where light is measured anew, with many more rays, to know how wrong a result is.
+
+Two kinds. Some of the receivers themselves: what noise and smoothing leave there is what more rays can mend. And
+random points of the surfaces, where the result is looked up as a viewer does: that is what an artist sees, texel size
+and all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .charts import Charts
+from .emitters import LUMINANCE
+from .receivers import CornerMeans, Receivers, surface_receivers
+from .scene import Scene
+from .texels import TexelMap
+
+PROBES = 2048
+DARK = 0.3  # of the median irradiance: what is added to a point's own before its error is called relative
+MOST_OF_OBJECT = 0.25  # of the seen points that lie on one object: a ground plane must not take all
+
+
+@dataclass(frozen=True, slots=True)
+class SeenPoints:
+    """Random points of the target surfaces, and what a viewer finds there.
+
+    Attributes
+    ----------
+    receivers : (M,) the points
+    look_up : irradiance of all receivers of a bake (N, 3) -> what the stored result shows at the points (M, 3)
+    """
+
+    receivers: Receivers
+    look_up: Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Light at probes, measured.
+
+    Attributes
+    ----------
+    luminance, variance : (M,) of the irradiance, and of that estimate [W/m^2], squared
+    rays : traced
+    """
+
+    luminance: np.ndarray
+    variance: np.ndarray
+    rays: int
+
+    def error_of(self, values, scale) -> float:
+        """Relative RMS error of irradiance (M, 3); what the probes are uncertain by themselves is taken out."""
+        # one wrong point counts as one, however wrong
+        squares = np.minimum(((values @ LUMINANCE - self.luminance) / scale) ** 2, 1.0)
+        squares = squares - np.minimum(self.variance / scale**2, 1.0)
+        return float(np.sqrt(max(squares.mean(), 0.0))) if len(squares) else 0.0
+
+
+def scale_of(irradiance):
+    """What an error is relative to: the luminance, and a share of its median where that is dark, (N,) [W/m^2]."""
+    luminance = irradiance @ LUMINANCE
+    lit = luminance[luminance > 1e-4 * max(luminance.mean(), 1e-30)]
+    return luminance + DARK * (np.median(lit) if len(lit) else 1.0)
+
+
+def chosen_receivers(count: int):
+    """Receivers that are measured, evenly through ``count`` of them: uint32 (K,)."""
+    return np.unique(np.linspace(0, count - 1, min(PROBES, count)).round().astype(np.uint32))
+
+
+def seen_through_lightmap(scene: Scene, charts: Charts, texel_map: TexelMap, seed: int) -> SeenPoints:
+    """Points that are looked up in a lightmap bilinearly, as a viewer does."""
+    triangles, barycentrics = _random_points(scene, np.isfinite(charts.uvs).all(axis=(1, 2)), seed)
+    grid = np.full((texel_map.height, texel_map.width), -1, np.int32)
+    grid[texel_map.rows, texel_map.columns] = np.arange(len(texel_map))
+    places = np.einsum("nk,nkc->nc", barycentrics, charts.uvs[triangles].astype(np.float64)) - 0.5
+    low = np.floor(places).astype(np.int64)
+    shares = places - low
+    indices, weights = [], []
+    for row in (0, 1):
+        for column in (0, 1):
+            x = np.clip(low[:, 0] + column, 0, texel_map.width - 1)
+            y = np.clip(low[:, 1] + row, 0, texel_map.height - 1)
+            across = shares[:, 0] if column else 1 - shares[:, 0]
+            weight = across * (shares[:, 1] if row else 1 - shares[:, 1])
+            indices.append(np.maximum(grid[y, x], 0))
+            weights.append(np.where(grid[y, x] >= 0, weight, 0.0))
+    indices, weights = np.stack(indices, axis=1), np.stack(weights, axis=1)
+    weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
+    receivers = surface_receivers(scene, triangles, barycentrics)
+    return SeenPoints(receivers, lambda values: np.einsum("nk,nkc->nc", weights, values[indices]))
+
+
+def seen_through_corners(scene: Scene, means: CornerMeans, seed: int) -> SeenPoints:
+    """Points between whose triangle's corners colours are interpolated."""
+    is_coloured = np.zeros(len(scene.triangles), bool)
+    is_coloured[means.triangles] = True
+    triangles, barycentrics = _random_points(scene, is_coloured, seed)
+    rows = np.searchsorted(means.triangles, triangles)
+    receivers = surface_receivers(scene, triangles, barycentrics)
+    return SeenPoints(
+        receivers, lambda values: np.einsum("nk,nkc->nc", barycentrics, means.corner_values(values)[rows])
+    )
+
+
+def _random_points(scene, is_usable, seed):
+    """Points by area on the usable triangles of the targets: triangles int32 (M,), barycentrics float64 (M, 3)."""
+    rng = np.random.default_rng([seed, 0x5EE4])
+    corners = scene.corners
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas[~is_usable] = 0.0
+    total = areas.sum()
+    for obj in scene.objects:
+        share = areas[obj.span].sum() / max(total, 1e-300)
+        if share > MOST_OF_OBJECT:
+            areas[obj.span] *= MOST_OF_OBJECT / share
+    if not areas.any():
+        return np.zeros(0, np.int32), np.zeros((0, 3))
+    triangles = rng.choice(len(areas), PROBES, p=areas / areas.sum()).astype(np.int32)
+    root, across = np.sqrt(rng.random(PROBES)), rng.random(PROBES)
+    return triangles, np.stack([1 - root, root * (1 - across), root * across], axis=1)

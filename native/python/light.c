@@ -1,0 +1,222 @@
+/*
+ * The part of the door that light at receivers goes through: direct light, guides, gathering, smoothing.
+ * SPDX-License-Identifier: GPL-3.0-or-later
+ */
+#include "door.h"
+
+/* The five arrays of a light table, as every function that samples lights takes them. */
+#define LIGHT_ARRAYS(at)                                                                                               \
+    {"light_kinds", 'i', 1, -1, false, {0}},                                                                           \
+        {"light_parameters", 'f', PL_LIGHT_FLOATS, AS_MANY_ROWS_AS(at), false, {0}},                                   \
+        {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 6, AS_MANY_ROWS_AS((at) + 2), false, {0}}, \
+    {                                                                                                                  \
+        "light_cumulative", 'f', 1, AS_MANY_ROWS_AS((at) + 2), false, {0}                                              \
+    }
+#define RECEIVER_ARRAYS(at)                                                                                            \
+    {"positions", 'd', 3, -1, false, {0}}, {"normals", 'f', 3, AS_MANY_ROWS_AS(at), false, {0}}, {                     \
+        "triangle_sides", 'i', 1, AS_MANY_ROWS_AS(at), false, {0}                                                      \
+    }
+enum { LIGHT_ARRAY_COUNT = 5, RECEIVER_ARRAY_COUNT = 3 };
+
+static pl_lights lights_of(const door_array *arrays) {
+    return (pl_lights){arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
+                       arrays[3].view.buf, arrays[4].view.buf, door_rows(&arrays[4])};
+}
+
+static pl_receivers receivers_of(const door_array *arrays) {
+    return (pl_receivers){arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf, door_rows(&arrays[0])};
+}
+
+/* Items of a tuple argument into objects[0..count); false with an exception if it is no tuple of that many. */
+static bool unpack(PyObject *tuple, Py_ssize_t count, PyObject **out_objects) {
+    if (!PyTuple_Check(tuple) || PyTuple_Size(tuple) != count) {
+        PyErr_Format(PyExc_TypeError, "expected a tuple of %zd arrays", count);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i)
+        out_objects[i] = PyTuple_GetItem(tuple, i);
+    return true;
+}
+
+/* What gathering needs of the scene: 2 capsules, then the arrays of the solution, the texels, the lights, the
+ * receivers. */
+enum {
+    SOLUTION_ARRAY_COUNT = 6,
+    TEXELS_AT = SOLUTION_ARRAY_COUNT,
+    TEXEL_ARRAY_COUNT = 3,
+    LIGHTS_AT = TEXELS_AT + TEXEL_ARRAY_COUNT,
+    RECEIVERS_AT = LIGHTS_AT + LIGHT_ARRAY_COUNT,
+    GATHER_ARRAY_COUNT = RECEIVERS_AT + RECEIVER_ARRAY_COUNT
+};
+#define GATHER_ARRAYS(sides)                                                                                           \
+    {"radiosity", 'f', 3, sides, false, {0}}, {"direct", 'f', 3, sides, false, {0}},                                   \
+        {"reflectance", 'f', 3, (sides) / 2, false, {0}}, {"kinds", 'B', 1, sides, false, {0}},                        \
+        {"reaches", 'f', 1, sides, false, {0}}, {"sky", 'f', 3, 1, false, {0}}, {"texel_uvs", 'f', 6, -1, false, {0}}, \
+        {"texel_receivers", 'i', 1, -1, false, {0}}, {"texel_radiosity", 'f', 3, -1, false, {0}},                      \
+        LIGHT_ARRAYS(LIGHTS_AT), RECEIVER_ARRAYS(RECEIVERS_AT)
+
+static pl_solution solution_of(const door_array *arrays) {
+    const float *sky = arrays[5].view.buf;
+    return (pl_solution){arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf,
+                         arrays[3].view.buf, arrays[4].view.buf, {sky[0], sky[1], sky[2]}};
+}
+
+/* `width` 0: no texel has a light of its own yet. */
+static pl_texel_light texels_of(const door_array *arrays, int32_t width, float reach) {
+    const int32_t height = width > 0 ? (int32_t)(door_rows(&arrays[1]) / (size_t)width) : 0;
+    return (pl_texel_light){arrays[0].view.buf, arrays[1].view.buf, width, height, arrays[2].view.buf, reach};
+}
+
+/* The tuples (solution, lights, receivers) into objects[0 .. GATHER_ARRAY_COUNT); false with an exception. */
+static bool unpack_gather(PyObject *const *tuples, PyObject **out_objects) {
+    return unpack(tuples[0], SOLUTION_ARRAY_COUNT, out_objects) &&
+           unpack(tuples[1], LIGHT_ARRAY_COUNT, out_objects + LIGHTS_AT) &&
+           unpack(tuples[2], RECEIVER_ARRAY_COUNT, out_objects + RECEIVERS_AT);
+}
+
+PyObject *door_gather(PyObject *self, PyObject *args) {
+    enum { GROUPS = GATHER_ARRAY_COUNT, SHARES, SELECTED, SUMS, ARRAYS };
+    PyObject *capsules[2], *tuples[3], *guide_arrays, *objects[ARRAYS];
+    pl_gather_rays rays;
+    int width;
+    float reach;
+    uint64_t traced = 0;
+    pl_status status;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOO(OOOif)OOOOIIIIO", &capsules[0], &capsules[1], &tuples[0], &objects[TEXELS_AT],
+                          &objects[TEXELS_AT + 1], &objects[TEXELS_AT + 2], &width, &reach, &tuples[1], &tuples[2],
+                          &guide_arrays, &objects[SELECTED], &rays.replicates, &rays.first, &rays.count, &rays.seed,
+                          &objects[SUMS]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
+    door_array arrays[] = {GATHER_ARRAYS(sides),
+                           {"guide_groups", 'i', 1, AS_MANY_ROWS_AS(RECEIVERS_AT), false, {0}},
+                           {"guide_shares", 'f', PL_GUIDE_CELLS, -1, false, {0}},
+                           {"selected", 'I', 1, -1, false, {0}},
+                           {"io_sums", 'f', 3, -1, true, {0}}};
+    if (!patches || !unpack_gather(tuples, objects) || !unpack(guide_arrays, 2, objects + GROUPS) ||
+        !door_arrays(objects, arrays, ARRAYS))
+        return NULL;
+    if (!door_has_numbers(&arrays[SUMS], 3 * (size_t)rays.replicates * door_rows(&arrays[RECEIVERS_AT]))) {
+        door_release(arrays, ARRAYS);
+        return NULL;
+    }
+    const pl_solution solution = solution_of(arrays);
+    const pl_lights lights = lights_of(arrays + LIGHTS_AT);
+    const pl_receivers receivers = receivers_of(arrays + RECEIVERS_AT);
+    const pl_texel_light texels = texels_of(arrays + TEXELS_AT, width, reach);
+    const pl_gather_scene in = {scene, patches, &solution, width > 0 ? &texels : NULL, &lights};
+    const pl_guides guides = {arrays[GROUPS].view.buf, arrays[SHARES].view.buf, door_rows(&arrays[SHARES])};
+
+    Py_BEGIN_ALLOW_THREADS
+    status = pl_gather(&in, &receivers, &guides, arrays[SELECTED].view.buf, door_rows(&arrays[SELECTED]), rays,
+                       arrays[SUMS].view.buf, &traced);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, ARRAYS);
+    return status == PL_OK ? PyLong_FromUnsignedLongLong(traced) : door_result(status);
+}
+
+PyObject *door_learn_guides(PyObject *self, PyObject *args) {
+    enum { MEMBERS = GATHER_ARRAY_COUNT, FIRST_MEMBERS, MOMENTS, ARRAYS };
+    PyObject *capsules[2], *tuples[3], *objects[ARRAYS];
+    Py_ssize_t first, count;
+    unsigned rays, seed;
+    int width;
+    float reach;
+    uint64_t traced = 0;
+    pl_status status = PL_ERR_ARGUMENT;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOO(OOOif)OOOOnnIIO", &capsules[0], &capsules[1], &tuples[0], &objects[TEXELS_AT],
+                          &objects[TEXELS_AT + 1], &objects[TEXELS_AT + 2], &width, &reach, &tuples[1], &tuples[2],
+                          &objects[MEMBERS], &objects[FIRST_MEMBERS], &first, &count, &rays, &seed, &objects[MOMENTS]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
+    door_array arrays[] = {GATHER_ARRAYS(sides),
+                           {"members", 'I', 1, -1, false, {0}},
+                           {"first_members", 'I', 1, -1, false, {0}},
+                           {"out_moments", 'f', PL_GUIDE_CELLS, -1, true, {0}}};
+    if (!patches || !unpack_gather(tuples, objects) || !door_arrays(objects, arrays, ARRAYS))
+        return NULL;
+    const pl_solution solution = solution_of(arrays);
+    const pl_lights lights = lights_of(arrays + LIGHTS_AT);
+    const pl_receivers receivers = receivers_of(arrays + RECEIVERS_AT);
+    const pl_texel_light texels = texels_of(arrays + TEXELS_AT, width, reach);
+    const pl_gather_scene in = {scene, patches, &solution, width > 0 ? &texels : NULL, &lights};
+    const bool fits = first >= 0 && count >= 0 && (size_t)(first + count) <= door_rows(&arrays[MOMENTS]) &&
+                      (size_t)(first + count) < door_rows(&arrays[FIRST_MEMBERS]);
+
+    Py_BEGIN_ALLOW_THREADS
+    if (fits)
+        status = pl_learn_guides(&in, &receivers, arrays[MEMBERS].view.buf, arrays[FIRST_MEMBERS].view.buf,
+                                 (size_t)first, (size_t)count, rays, seed, arrays[MOMENTS].view.buf, &traced);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, ARRAYS);
+    return status == PL_OK ? PyLong_FromUnsignedLongLong(traced) : door_result(status);
+}
+
+PyObject *door_direct(PyObject *self, PyObject *args) {
+    enum { RECEIVERS = LIGHT_ARRAY_COUNT, IRRADIANCE = RECEIVERS + RECEIVER_ARRAY_COUNT, VARIANCE, ARRAYS };
+    PyObject *capsule, *light_arrays, *receiver_arrays, *objects[ARRAYS];
+    Py_ssize_t first, count;
+    unsigned samples, seed;
+    uint64_t rays = 0;
+    pl_status status;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOnnIIOO", &capsule, &light_arrays, &receiver_arrays, &first, &count, &samples, &seed,
+                          &objects[IRRADIANCE], &objects[VARIANCE]))
+        return NULL;
+    const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
+    door_array arrays[] = {LIGHT_ARRAYS(0),
+                           RECEIVER_ARRAYS(RECEIVERS),
+                           {"out_irradiance", 'f', 3, AS_MANY_ROWS_AS(RECEIVERS), true, {0}},
+                           {"out_variance", 'f', 1, AS_MANY_ROWS_AS(RECEIVERS), true, {0}}};
+    if (!scene || !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects) ||
+        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) || !door_arrays(objects, arrays, ARRAYS))
+        return NULL;
+    const pl_lights lights = lights_of(arrays);
+    const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
+
+    Py_BEGIN_ALLOW_THREADS
+    status = pl_direct(scene, &lights, &receivers, (size_t)first, (size_t)count, samples, seed,
+                       arrays[IRRADIANCE].view.buf, arrays[VARIANCE].view.buf, &rays);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, ARRAYS);
+    return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
+}
+
+PyObject *door_smooth(PyObject *self, PyObject *args) {
+    enum { VALUES = RECEIVER_ARRAY_COUNT + 1, VARIANCES, OUT_VALUES, OUT_VARIANCES, ARRAYS };
+    PyObject *receiver_arrays, *objects[ARRAYS];
+    pl_texel_grid grid;
+    int step, stops_on_value, first_row, row_count;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OiifOOOiiiiOO", &objects[RECEIVER_ARRAY_COUNT], &grid.width, &grid.height,
+                          &grid.spacing, &receiver_arrays, &objects[VALUES], &objects[VARIANCES], &step,
+                          &stops_on_value, &first_row, &row_count, &objects[OUT_VALUES], &objects[OUT_VARIANCES]))
+        return NULL;
+    door_array arrays[] = {RECEIVER_ARRAYS(0),
+                           {"grid", 'i', 1, (Py_ssize_t)grid.width * grid.height, false, {0}},
+                           {"values", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}},
+                           {"out_variances", 'f', 1, AS_MANY_ROWS_AS(0), true, {0}}};
+    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS))
+        return NULL;
+    const pl_receivers receivers = receivers_of(arrays);
+    grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value, first_row,
+              row_count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, ARRAYS);
+    Py_RETURN_NONE;
+}
