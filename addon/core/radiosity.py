@@ -6,24 +6,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .conjugate_gradient import require_exchange_size, solve_conjugate_gradient
+from .dense import require_direct_size, solve_direct
 from .emitters import LUMINANCE, Emitters, with_sources
+from .exchange import exchange_of
 from .kernel import KernelScene
 from .patches import Patches, patch_size_for, patch_triangles, subdivide
+from .progressive import solve_progressive
 from .receivers import patch_receivers
 from .scene import Scene, exitance_from_radiance, radiance_from_exitance
 from .settings import BakeSettings
-from .solver import Solution, require_direct_size, solve_direct, solve_progressive, solve_stochastic
+from .solver import Solution
+from .stochastic import solve_stochastic
 from .transport import form_factors
 
 EVEN, MIXED_SIDE, LIGHT = 0, 1, 2  # kinds of sides, as the kernel has them
 # patches, about, that each solver is given; triangles are never joined, so there may be more
-PATCH_BUDGETS = {"direct": 1200, "progressive": 3000, "stochastic": 60000}
+PATCH_BUDGETS = {"direct": 1200, "conjugate-gradient": 3000, "progressive": 3000, "stochastic": 60000}
 DIRECT_TRIANGLES, PROGRESSIVE_TRIANGLES = 150, 1500  # up to which "auto" takes them
 POINTS = 8  # of a patch side: where its direct light is measured
 SMALL = 0.25  # of a full-size patch's area: smaller ones are measured at one point
 PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 1
 PATCH_SKY_RAYS = 4  # of each point
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
+CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it
 MIXED = 0.5  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
 BRIGHT = 20.0  # times the median radiosity: brighter sides are sampled as lights, which few gather rays would find
 BRIGHT_SHARE = 0.005  # of all area that they may be: where much is bright, gather rays find it well
@@ -165,9 +171,14 @@ def _solve(kernel, patches, emitted, solver, method, settings, on_step) -> Solut
     estimator = form_factors(kernel, method, settings.error, settings.seed)
     if solver == "progressive":
         return solve_progressive(estimator, reflectance, emitted, areas, UNSHOT_LIMIT, on_step)
-    require_direct_size(len(emitted))
-    rows = estimator.rows(np.arange(len(emitted)))
-    return replace(solve_direct(rows, reflectance, emitted, areas), rays=estimator.rays_per_row * len(emitted))
+    require_size = require_direct_size if solver == "direct" else require_exchange_size
+    require_size(len(emitted))
+    exchange = exchange_of(estimator.rows(np.arange(len(emitted))), areas)
+    if solver == "direct":
+        solution = solve_direct(exchange.form_factors(areas), reflectance, emitted, areas)
+    else:
+        solution = solve_conjugate_gradient(exchange, reflectance, emitted, areas, CG_LIMIT, on_step)
+    return replace(solution, rays=estimator.rays_per_row * len(emitted))
 
 
 def choose(settings: BakeSettings, triangle_count: int) -> tuple[str, str, str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 TARGETS = ("lightmap", "vertex")
 METHODS = ("auto", "hemicube", "monte-carlo")
-SOLVERS = ("auto", "direct", "progressive", "stochastic")
+SOLVERS = ("auto", "direct", "conjugate-gradient", "progressive", "stochastic")
 
 
 class SettingsError(ValueError):

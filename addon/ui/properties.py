@@ -42,6 +42,7 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
         items=(
             ("auto", "Automatic", "Choose by the number of patches"),
             ("direct", "Direct", "Exact; for small scenes only"),
+            ("conjugate-gradient", "Conjugate Gradient", "Exact; for medium scenes, and for very bright materials"),
             ("progressive", "Progressive", "Shoot from the brightest patch first"),
             ("stochastic", "Stochastic", "For large scenes; always uses Monte Carlo rays"),
         ),

@@ -1,0 +1,186 @@
+"""Stochastic Jacobi: all sides shoot their flux at once, along rays in proportion to it (Neumann 1995, Bekaert 1999).
+
+No form factors are kept, so any number of sides will do. First each step shoots what the one before has left
+(incremental shooting), with as many rays less: steps without end where little is absorbed. There regular iterations go
+on: each shoots all light, scaled so that what is taken from it is what is emitted; the results of many are averaged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .report import Energy
+from .solver import Solution
+
+FULL = 1 << 62  # what all flux of one step comes to, in fixed point
+REPLICATES = 4  # independent runs that share the rays; their spread is the standard error
+LEAST_RAYS = 1024  # of a step
+LEAST_STEPS = 4  # before the reflectance of the whole is known well enough to choose how to go on
+BURN_IN = 6  # regular iterations until the light has its shape: each leaves about a third of what was wrong with it
+LEAST_MEANS, MOST_MEANS = 8, 32  # iterations that are averaged
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """What one replicate found: flux (N, 3) [W], and a bound of its truncation [W/m^2]."""
+
+    flux: np.ndarray
+    residuals: tuple[float, ...]
+    energy: Energy
+    rays: int
+    error_bound: float
+
+
+def solve_stochastic(
+    kernel, reflectance, emitted, areas, rays, unshot_limit, seed, on_step=None, replicates: int = REPLICATES
+) -> Solution:
+    """The mean of ``replicates`` independent runs that share ``rays``, those of the first step.
+
+    The residual is the flux that is not accounted for, |emitted - absorbed - escaped| over emitted: of incremental
+    shooting, what is unshot. It stops both kinds of steps; noise is not in it but in the standard errors.
+
+    Parameters
+    ----------
+    kernel : has ``shoot``, as kernel.KernelScene
+    reflectance, emitted : (N, 3) [1], [W/m^2]; areas : (N,) [m^2]
+    """
+    column, reflectance = np.asarray(areas, np.float64)[:, None], np.asarray(reflectance, np.float64)
+    emitted_flux = column * np.asarray(emitted, np.float64)
+    runs = []
+    for replicate in range(replicates):
+        shooting = _Shooting(kernel, reflectance, column, seed, replicate)
+
+        def on_part(done, replicate=replicate):
+            if on_step:
+                on_step((replicate + min(max(done, 0.0), 1.0)) / replicates)
+
+        runs.append(_incremental(shooting, emitted_flux, max(rays // replicates, 1), unshot_limit, on_part))
+    fluxes = np.stack([run.flux for run in runs]) / np.maximum(column, 1e-300)
+    errors = fluxes.std(axis=0, ddof=1) / replicates**0.5 if replicates > 1 else None
+    energy = Energy(*(float(np.mean([getattr(run.energy, name) for run in runs])) for name in Energy.__slots__))
+    return Solution(
+        radiosity=fluxes.mean(axis=0),
+        residuals=_mean_residuals(runs),
+        energy=energy,
+        rays=sum(run.rays for run in runs),
+        solver="stochastic",
+        error_bound=float(np.mean([run.error_bound for run in runs])),
+        standard_errors=errors,
+    )
+
+
+def _mean_residuals(runs):
+    """Step by step the runs' mean; one that has ended keeps its last."""
+    steps = max(len(run.residuals) for run in runs)
+    padded = [run.residuals + run.residuals[-1:] * (steps - len(run.residuals)) for run in runs]
+    return tuple(np.mean(padded, axis=0).tolist())
+
+
+class _Shooting:
+    """One replicate's rays: shoots flux, keeps count of what each side's sequence has used."""
+
+    def __init__(self, kernel, reflectance, areas, seed, replicate):
+        self._kernel = kernel
+        self._seed = (seed + 0x9E3779B9 * replicate) & 0xFFFFFFFF  # of the first replicate the scene's own
+        self._samples = np.zeros(len(areas), np.uint32)
+        self._rng = np.random.default_rng([seed, 0x5AC0, replicate])
+        self.reflectance, self.areas = reflectance, areas
+        self.rays = 0
+
+    def shoot(self, flux, rays):
+        """What is reflected at once of flux (N, 3) [W] shot along rays, (N, 3), and what leaves the scene, (3,)."""
+        first_rays, per_ray, scale = _allot(flux, rays, self._rng.random())
+        received, gone = self._kernel.shoot(first_rays, self._samples, per_ray, self._seed)
+        self._samples += np.diff(first_rays).astype(np.uint32)
+        self.rays += int(first_rays[-1])
+        return self.reflectance * (received / scale), gone / scale
+
+    def bound(self, rest):
+        """|r|_inf / (1 - max rho): a row of form factors sums to 1 at most."""
+        gain = self.reflectance.max(initial=0.0)
+        return (
+            float(np.abs(rest / np.maximum(self.areas, 1e-300)).max(initial=0.0) / (1 - gain)) if gain < 1 else np.inf
+        )
+
+
+def _incremental(shooting, emitted, rays, unshot_limit, on_step) -> _Run:
+    """Shoot what is unshot until little is left, or go on by regular iterations where those are fewer rays."""
+    total, unshot = emitted.copy(), emitted
+    first = float(emitted.sum())
+    residuals, escaped, absorbed = [], 0.0, 0.0
+    while first > 0:
+        left = float(unshot.sum()) / first
+        residuals.append(left)
+        if left <= unshot_limit:
+            break
+        on_step(np.log(max(left, 1e-300)) / np.log(unshot_limit))
+        kept = min(left / residuals[-2], 1.0) if len(residuals) > 1 else 0.0
+        if len(residuals) > LEAST_STEPS and left > (BURN_IN + LEAST_MEANS) * (1 - kept):
+            return _regular(shooting, emitted, total, rays, unshot_limit, residuals, on_step)
+        reflected, gone = shooting.shoot(unshot, max(int(rays * left), LEAST_RAYS))
+        # what neither was reflected nor left was taken by surfaces, or by tinted glass
+        absorbed += float(unshot.sum() - gone.sum() - reflected.sum())
+        escaped += float(gone.sum())
+        total = total + reflected
+        unshot = reflected
+    energy = Energy(first, absorbed, escaped, float(unshot.sum()))
+    return _Run(total, tuple(residuals), energy, shooting.rays, shooting.bound(unshot))
+
+
+def _regular(shooting, emitted, flux, rays, unshot_limit, residuals, on_step) -> _Run:
+    """Iterate on all flux, Phi <- M + rho F^T Phi, scaled in each channel to keep the balance; average the end.
+
+    Scaling ends at once the mode that is slow, the mean light, whatever the reflectance (aggregation, with the light
+    itself as the aggregate's shape); the shape goes on by bounces, which forget it fast. Both sums of the scale are of
+    positive fluxes, so it has no noise to speak of.
+    """
+    shot = emitted.sum(axis=0)
+    begun, means = len(residuals), 0
+    sum_shot, sum_reflected, sum_escaped = np.zeros_like(emitted), np.zeros_like(emitted), np.zeros(len(shot))
+    while means < MOST_MEANS:
+        reflected, gone = shooting.shoot(flux, rays)
+        scale = _scale(shot, flux, reflected)
+        if len(residuals) - begun >= BURN_IN:
+            means += 1
+            sum_shot, sum_reflected, sum_escaped = sum_shot + flux, sum_reflected + reflected, sum_escaped + gone
+            accounted = (sum_shot.sum(axis=0) - sum_reflected.sum(axis=0)) / means
+        else:
+            accounted = flux.sum(axis=0) - reflected.sum(axis=0)
+        residuals.append(float(np.abs(shot - accounted).sum() / shot.sum()))
+        on_step((len(residuals) - begun) / (BURN_IN + MOST_MEANS))
+        if means >= LEAST_MEANS and residuals[-1] <= unshot_limit:
+            break
+        flux = emitted + scale * reflected
+    scale = _scale(shot, sum_shot, sum_reflected)
+    total, escaped = emitted + scale * sum_reflected, float((scale * sum_escaped).sum())
+    energy = Energy(float(shot.sum()), float(shot.sum()) - escaped, escaped, 0.0)
+    return _Run(total, tuple(residuals), energy, shooting.rays, shooting.bound(total - scale * sum_shot))
+
+
+def _scale(shot, flux, reflected):
+    """What to multiply flux with so that as much is taken from it as is emitted, a channel each."""
+    taken = flux.sum(axis=0) - reflected.sum(axis=0)
+    # a channel without light stays dark; one in which nothing is taken has no balance
+    return np.where(shot > 0, shot / np.maximum(taken, 1e-9 * np.maximum(shot, 1e-300)), 0.0)
+
+
+def _allot(unshot, rays, offset):
+    """Rays per side in proportion to its unshot flux, by systematic sampling.
+
+    Returns the first ray of each side, uint64 (N + 1,), the flux of one of its rays in fixed point, uint64 (N, 3), and
+    the scale of that. Counts are rounded up or down at random, so the rays would carry a little more or less than
+    there is; each channel is scaled to carry exactly that, as a balance kept over 1 / (1 - rho) steps needs.
+    """
+    weights = unshot.sum(axis=1)
+    expected = rays * weights / weights.sum()
+    bounds = np.floor(np.concatenate([[0.0], np.cumsum(expected)]) + offset)
+    first_rays = (bounds - bounds[0]).astype(np.uint64)
+    counts = np.diff(first_rays).astype(np.float64)[:, None]
+    per_ray = unshot / np.maximum(expected, 1e-300)[:, None]
+    per_ray[counts[:, 0] == 0] = 0.0
+    carried = (per_ray * counts).sum(axis=0)
+    fixed = (per_ray * (FULL / np.where(carried > 0, carried, 1.0))).astype(np.uint64)
+    carried_fixed = (fixed.astype(np.float64) * counts).sum(axis=0)
+    return first_rays, fixed, np.where(carried_fixed > 0, carried_fixed / np.maximum(unshot.sum(axis=0), 1e-300), 1.0)
