@@ -67,7 +67,9 @@ def solve_conjugate_gradient(
         residuals[-1] = flux_of(rest, areas) / first  # the true one, not the recurrence's
     sums = 1 - exchange.escapes / np.where(areas > 0, areas, 1.0)
     # own exchange below 0 counts by its size: the bound takes sums of |F|
-    sums = sums + 2 * np.maximum(-exchange.own - np.diagonal(exchange.pairs), 0.0) / np.where(areas > 0, areas, 1.0)
+    diagonal = exchange.own.copy()
+    diagonal[exchange.sides] += np.diagonal(exchange.pairs)
+    sums = sums + 2 * np.maximum(-diagonal, 0.0) / np.where(areas > 0, areas, 1.0)
     bound = truncation_bound(rest, reflectance, sums)
     escaped = (exchange.escapes[:, None] * radiosity).sum()
     energy = balance(emitted, arriving, rest, reflectance, areas, escaped)

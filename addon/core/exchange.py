@@ -24,25 +24,28 @@ class Exchange:
 
     Attributes
     ----------
-    pairs : (N, N), float32 or float64 as the rows were; pairs_ij = pairs_ji to the bit [m^2]
+    pairs : (K, K), float32 or float64 as the rows were; pairs_ij = pairs_ji to the bit [m^2]
+    sides : (K,) those that exchange anything, which ``pairs`` is of; backs of walls do not
     own : float64 (N,) what closes the balance of a side, with itself: rounding and the rest of the repair [m^2]
     escapes : float64 (N,) A_i (1 - sum_j F_ij), of the side's own row; 0 in a closed scene [m^2]
     """
 
     pairs: np.ndarray
+    sides: np.ndarray
     own: np.ndarray
     escapes: np.ndarray
 
     def arriving(self, radiosity):
         """Flux that arrives at each side, A_i sum_j F_ij B_j, float64 (N, C) [W], from radiosity (N, C) [W/m^2]."""
-        flux = self.own[:, None] * radiosity
-        for rows in _blocks(len(flux)):
-            flux[rows] += self.pairs[rows].astype(np.float64, copy=False) @ radiosity
+        flux, seen = self.own[:, None] * radiosity, radiosity[self.sides]
+        for rows in _blocks(len(self.sides)):
+            flux[self.sides[rows]] += self.pairs[rows].astype(np.float64, copy=False) @ seen
         return flux
 
     def form_factors(self, areas):
         """Rows of form factors, float64 (N, N), reciprocal, each with the sum that its own rays found."""
-        rows = self.pairs.astype(np.float64)
+        rows = np.zeros((len(self.own), len(self.own)))
+        rows[np.ix_(self.sides, self.sides)] = self.pairs
         rows[np.diag_indices(len(rows))] += self.own
         rows /= np.where(areas > 0, areas, 1.0)[:, None]
         return rows
@@ -67,10 +70,13 @@ def exchange_of(form_factors, areas, is_closed: bool = False) -> Exchange:
     sums = rows.sum(axis=1, dtype=np.float64)
     escapes = np.where(is_closed, 0.0, areas * np.clip(1 - sums, 0.0, 1.0))
     escapes[1 - sums < 64 * np.finfo(rows.dtype).eps] = 0.0  # rounding, which 1 / (1 - rho) would multiply
-    _average(rows, areas)
-    wanted = areas - escapes
-    _repair(rows, wanted)
-    return Exchange(rows, wanted - rows.sum(axis=1, dtype=np.float64), escapes)
+    sides = np.flatnonzero(rows.any(axis=0) | rows.any(axis=1))
+    pairs = rows if len(sides) == len(rows) else rows[np.ix_(sides, sides)]
+    _average(pairs, areas[sides])
+    own = areas - escapes
+    _repair(pairs, own[sides])
+    own[sides] -= pairs.sum(axis=1, dtype=np.float64)
+    return Exchange(pairs, sides, own, escapes)
 
 
 def _average(rows, areas):

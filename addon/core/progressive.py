@@ -27,8 +27,8 @@ class ProgressiveRefinement:
         self._form_factors = form_factors
         self._reflectance = np.asarray(reflectance, np.float64)
         self.areas = np.asarray(areas, np.float64)
-        self._rows: dict[int, np.ndarray] = {}
-        self._row_limit = row_limit // max(4 * len(areas), 1)
+        self._rows: dict[int, tuple] = {}  # of a side: those that it sees, and its form factors to them
+        self._free = self._row_limit = row_limit
         self._has_row = np.zeros(len(areas), bool)
         self._row_sums = np.zeros(len(areas))
         self._arrivals = np.zeros(len(areas))  # sum over the rows known of A_i F_ij [m^2]
@@ -38,12 +38,8 @@ class ProgressiveRefinement:
         self.absorbed = np.zeros(self.unshot.shape[1])  # [W], a channel each
         self.escaped = np.zeros(self.unshot.shape[1])
         self.is_reached = (self.unshot != 0).any(axis=1)
+        self.unshot_flux = self._sizes()
         self.rows_computed = 0
-
-    @property
-    def unshot_flux(self):
-        """Size of the flux still to be shot by each side, summed over channels, (N,) [W]."""
-        return self.areas * np.abs(self.unshot).sum(axis=1)
 
     @property
     def ambient(self):
@@ -64,17 +60,19 @@ class ProgressiveRefinement:
 
     def shoot(self, side: int) -> None:
         """Distribute what one side has not shot yet: B_j += rho_j F_ij A_i / A_j dB_i."""
-        row = self._row(side)
-        seen = np.flatnonzero(row)
+        seen, shares = self._row(side)
         flux = self.areas[side] * self.unshot[side]
-        landed = row[seen, None] * flux
+        landed = shares[:, None] * flux
         reflected = self._reflectance[seen] * landed
         self.absorbed += (landed - reflected).sum(axis=0)
         self.escaped += flux - landed.sum(axis=0)
         self.unshot[side] = 0.0
         added = reflected / np.maximum(self.areas[seen], 1e-300)[:, None]
         self.radiosity[seen] += added
-        self.unshot[seen] += added
+        unshot = self.unshot[seen] + added
+        self.unshot[seen] = unshot
+        self.unshot_flux[side] = 0.0
+        self.unshot_flux[seen] = self.areas[seen] * np.abs(unshot).sum(axis=1)
         self.is_reached[seen] = True
 
     def amounts(self) -> tuple:
@@ -97,6 +95,7 @@ class ProgressiveRefinement:
         self.unshot[:, channel] += multiple * unshot[:, channel]
         self.absorbed[channel] += multiple * absorbed[channel]
         self.escaped[channel] += multiple * escaped[channel]
+        self.unshot_flux = self._sizes()
 
     def error_bound(self) -> float:
         """Of |B - B_k| for the form factors as they were shot [W/m^2]; two norms, the smaller bound.
@@ -110,12 +109,15 @@ class ProgressiveRefinement:
         else:
             sums = self._arrivals / np.maximum(self.areas, 1e-300)
             by_rows = truncation_bound(self.unshot, self._reflectance, sums)
-        # of rows not known: a share of what leaves, so at most 1 but for rounding
-        shares = np.maximum(self._row_sums.max(initial=0.0), 1.0)
-        flux = flux_of(self.unshot, self.areas) if (self._reflectance * shares < 1).all() else np.inf
+        # rows that are not known are shares of what leaves: they sum to 1 at most, but for rounding
+        gain = float(self._reflectance.max(initial=0.0)) * max(self._row_sums.max(initial=0.0), 1.0)
         least = self.areas[self.areas > 0].min(initial=np.inf)
-        gain = float(self._reflectance.max(initial=0.0)) * shares
-        return min(by_rows, flux / max((1 - gain) * least, 1e-300) if np.isfinite(flux) else np.inf)
+        by_columns = flux_of(self.unshot, self.areas) / ((1 - gain) * least) if gain < 1 else np.inf
+        return min(by_rows, by_columns)
+
+    def _sizes(self):
+        """Size of the flux still to be shot by each side, summed over channels, (N,) [W]."""
+        return self.areas * np.abs(self.unshot).sum(axis=1)
 
     def _row(self, side):
         if side not in self._rows:
@@ -123,21 +125,24 @@ class ProgressiveRefinement:
             flux = self.unshot_flux
             brightest = np.argsort(-flux, kind="stable")[: min(64, np.count_nonzero(flux))]
             wanted = [side, *(int(s) for s in brightest if s != side and int(s) not in self._rows)]
-            if len(self._rows) + len(wanted) > self._row_limit:
+            if self._free < 0:
                 self._rows.clear()
+                self._free = self._row_limit
             self.rows_computed += len(wanted)
             for index, row in zip(wanted, self._form_factors.rows(np.array(wanted, np.int32))):
-                self._rows[index] = row
-                self._note(index, row)
-        return self._rows[side].astype(np.float64)
+                seen = np.flatnonzero(row)
+                self._rows[index] = seen, row[seen].astype(np.float64)
+                self._free -= 16 * len(seen)
+                self._note(index, *self._rows[index])
+        return self._rows[side]
 
-    def _note(self, side, row):
+    def _note(self, side, seen, shares):
         if not self._has_row[side]:
             self._has_row[side] = True
-            self._row_sums[side] = row.sum(dtype=np.float64)
-            arrivals = self.areas[side] * row
-            self._arrivals += arrivals
-            self._echo += arrivals[:, None] * self._reflectance[side]
+            self._row_sums[side] = shares.sum()
+            arrivals = self.areas[side] * shares
+            self._arrivals[seen] += arrivals
+            self._echo[seen] += arrivals[:, None] * self._reflectance[side]
 
 
 class Overshooting:
@@ -181,9 +186,17 @@ class Overshooting:
 
 
 def solve_progressive(
-    form_factors, reflectance, emitted, areas, unshot_limit, on_step=None, overshoots: bool = True
+    form_factors, reflectance, emitted, areas, unshot_limit, on_step=None, overshoots=True, most_sweeps=MOST_SWEEPS
 ) -> Solution:
-    """Shoot the largest unshot flux until less than ``unshot_limit`` of the first flux is left."""
+    """Shoot the largest unshot flux until less than ``unshot_limit`` of the first flux is left.
+
+    Parameters
+    ----------
+    form_factors : has ``rows(sides)``, as transport.MonteCarloFormFactors
+    reflectance, emitted : (N, 3) [1], [W/m^2]; areas : (N,) [m^2]
+    overshoots : False is the plain order of Cohen et al.
+    most_sweeps : as many shots as there are sides that light has reached, each
+    """
     state = ProgressiveRefinement(form_factors, reflectance, emitted, areas)
     overshooting = Overshooting(state)
     first = float(state.unshot_flux.sum())
@@ -192,7 +205,7 @@ def solve_progressive(
         flux = state.unshot_flux
         left = float(flux.sum()) / first
         residuals.append(left)
-        if left <= unshot_limit or sweeps >= MOST_SWEEPS:
+        if left <= unshot_limit or sweeps >= most_sweeps:
             break
         if on_step and len(residuals) % 16 == 0:
             done = max(done, np.log(max(left, 1e-300)) / np.log(unshot_limit))

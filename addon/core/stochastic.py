@@ -162,8 +162,8 @@ def _regular(shooting, emitted, flux, rays, unshot_limit, residuals, on_step) ->
 def _scale(shot, flux, reflected):
     """What to multiply flux with so that as much is taken from it as is emitted, a channel each."""
     taken = flux.sum(axis=0) - reflected.sum(axis=0)
-    # a channel without light stays dark; one in which nothing is taken has no balance
-    return np.where(shot > 0, shot / np.maximum(taken, 1e-9 * np.maximum(shot, 1e-300)), 0.0)
+    # a channel without light stays dark; one in which nothing is taken has no balance and must not overflow
+    return np.where(shot > 0, shot / np.maximum(taken, 1e-9 * np.maximum(flux.sum(axis=0), 1e-300)), 0.0)
 
 
 def _allot(unshot, rays, offset):
