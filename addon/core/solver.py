@@ -28,7 +28,8 @@ class Solution:
     solver : which one ran
     error_bound : of the largest |B - B_k| that further steps could still bring [W/m^2]; inf where rho F is not known to
         contract. About the system as it was solved: it does not cover the form factors' own error
-    standard_errors : float64 (N, 3) of the radiosities, by independent replicates [W/m^2]; None where nothing is random
+    standard_errors : float64 (N, 3) of the radiosities, by independent replicates [W/m^2], None where nothing is
+        random; of so few replicates that a side's own says little, their mean square over many sides a lot
     """
 
     radiosity: np.ndarray

@@ -15,7 +15,7 @@ from .report import Energy
 from .solver import Solution
 
 FULL = 1 << 62  # what all flux of one step comes to, in fixed point
-REPLICATES = 4  # independent runs that share the rays; their spread is the standard error
+REPLICATES = 2  # independent runs that share the rays: every step costs as many passes over all sides
 LEAST_RAYS = 1024  # of a step
 LEAST_STEPS = 4  # before the reflectance of the whole is known well enough to choose how to go on
 BURN_IN = 6  # regular iterations until the light has its shape: each leaves about a third of what was wrong with it
@@ -48,14 +48,16 @@ def solve_stochastic(
     """
     column, reflectance = np.asarray(areas, np.float64)[:, None], np.asarray(reflectance, np.float64)
     emitted_flux = column * np.asarray(emitted, np.float64)
-    runs = []
+    runs, told = [], 0.0
+
+    def on_part(done):
+        nonlocal told
+        told = max(told, (len(runs) + min(max(done, 0.0), 1.0)) / replicates)
+        if on_step:
+            on_step(told)
+
     for replicate in range(replicates):
         shooting = _Shooting(kernel, reflectance, column, seed, replicate)
-
-        def on_part(done, replicate=replicate):
-            if on_step:
-                on_step((replicate + min(max(done, 0.0), 1.0)) / replicates)
-
         runs.append(_incremental(shooting, emitted_flux, max(rays // replicates, 1), unshot_limit, on_part))
     fluxes = np.stack([run.flux for run in runs]) / np.maximum(column, 1e-300)
     errors = fluxes.std(axis=0, ddof=1) / replicates**0.5 if replicates > 1 else None
@@ -173,14 +175,17 @@ def _allot(unshot, rays, offset):
     the scale of that. Counts are rounded up or down at random, so the rays would carry a little more or less than
     there is; each channel is scaled to carry exactly that, as a balance kept over 1 / (1 - rho) steps needs.
     """
-    weights = unshot.sum(axis=1)
-    expected = rays * weights / weights.sum()
+    weights = unshot @ np.ones(unshot.shape[1])
+    expected = weights * (rays / weights.sum())
     bounds = np.floor(np.concatenate([[0.0], np.cumsum(expected)]) + offset)
     first_rays = (bounds - bounds[0]).astype(np.uint64)
-    counts = np.diff(first_rays).astype(np.float64)[:, None]
-    per_ray = unshot / np.maximum(expected, 1e-300)[:, None]
-    per_ray[counts[:, 0] == 0] = 0.0
-    carried = (per_ray * counts).sum(axis=0)
-    fixed = (per_ray * (FULL / np.where(carried > 0, carried, 1.0))).astype(np.uint64)
-    carried_fixed = (fixed.astype(np.float64) * counts).sum(axis=0)
-    return first_rays, fixed, np.where(carried_fixed > 0, carried_fixed / np.maximum(unshot.sum(axis=0), 1e-300), 1.0)
+    counts = np.diff(bounds)
+    shoots = np.flatnonzero(counts)  # backs of walls, half of all sides, do not
+    counts = counts[shoots]
+    per_ray = unshot[shoots] / expected[shoots, None]
+    carried = counts @ per_ray
+    per_ray = (per_ray * (FULL / np.where(carried > 0, carried, 1.0))).astype(np.uint64)
+    carried = counts @ per_ray.astype(np.float64)
+    fixed = np.zeros(unshot.shape, np.uint64)
+    fixed[shoots] = per_ray
+    return first_rays, fixed, np.where(carried > 0, carried / np.maximum(unshot.sum(axis=0), 1e-300), 1.0)
