@@ -185,10 +185,10 @@ def _solve(kernel, patches, emitted, solver, method, settings, on_step) -> Solut
 def choose(settings: BakeSettings, triangle_count: int, reflectance: float = 0.5) -> tuple[str, str, str]:
     """Solver, method, and a sentence on why, after "auto" has looked at the scene's size and mean reflectance.
 
-    By time to equal error, measured on closed cubes and the Cornell box of 240 to 52000 sides: rows of form factors and
-    conjugate gradients take one tenth of stochastic Jacobi's time at reflectance 0.9, a hundredth at 0.99, twice to
-    five times as much at 0.5; they fit up to some 16000 sides. Direct takes longer for the same, progressive refinement
-    leaves twice the error, as it uses each row for one direction only.
+    By time to equal error, measured on closed cubes and the Cornell box of 240 to 12000 sides: rows of form factors and
+    conjugate gradients take a third to a tenth of stochastic Jacobi's time at reflectance 0.9, a hundredth at 0.99, up
+    to five times as much at 0.5; they fit up to some 16000 sides. Direct takes longer for the same, progressive
+    refinement leaves twice the error, as it uses each row for one direction only.
     """
     method = "monte-carlo" if settings.method == "auto" else settings.method
     if settings.solver != "auto":

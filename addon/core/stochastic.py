@@ -18,19 +18,20 @@ FULL = 1 << 62  # what all flux of one step comes to, in fixed point
 REPLICATES = 2  # independent runs that share the rays: every step costs as many passes over all sides
 LEAST_RAYS = 1024  # of a step
 LEAST_STEPS = 4  # before the reflectance of the whole is known well enough to choose how to go on
-BURN_IN = 6  # regular iterations until the light has its shape: each leaves about a third of what was wrong with it
-LEAST_MEANS, MOST_MEANS = 8, 32  # iterations that are averaged
+REGULAR_COST = 40  # first steps' rays: where incremental shooting would take more, regular iterations go on
+WINDOW, LONGEST = 10, 80  # regular iterations averaged, at first and at most
 
 
 @dataclass(frozen=True, slots=True)
 class _Run:
-    """What one replicate found: flux (N, 3) [W], and a bound of its truncation [W/m^2]."""
+    """What one replicate found: flux (N, 3) [W], a bound of its truncation [W/m^2]; whether it gave up as too slow."""
 
     flux: np.ndarray
     residuals: tuple[float, ...]
     energy: Energy
     rays: int
     error_bound: float
+    is_slow: bool = False
 
 
 def solve_stochastic(
@@ -39,7 +40,8 @@ def solve_stochastic(
     """The mean of ``replicates`` independent runs that share ``rays``, those of the first step.
 
     The residual is the flux that is not accounted for, |emitted - absorbed - escaped| over emitted: of incremental
-    shooting, what is unshot. It stops both kinds of steps; noise is not in it but in the standard errors.
+    shooting, what is unshot; of regular iterations also how far the light's shape still moves. It stops both kinds of
+    steps; noise is not in it but in the standard errors.
 
     Parameters
     ----------
@@ -56,15 +58,22 @@ def solve_stochastic(
         if on_step:
             on_step(told)
 
-    for replicate in range(replicates):
-        shooting = _Shooting(kernel, reflectance, column, seed, replicate)
-        runs.append(_incremental(shooting, emitted_flux, max(rays // replicates, 1), unshot_limit, on_part))
+    rays = max(rays // replicates, 1)
+    shootings = [_Shooting(kernel, reflectance, column, seed, replicate) for replicate in range(replicates)]
+    for shooting in shootings:
+        runs.append(_incremental(shooting, emitted_flux, rays, unshot_limit, on_part))
+        if runs[-1].is_slow:
+            break
+    residuals = _mean_residuals(runs)
+    if runs[-1].is_slow:
+        runs, more = _regular(shootings, emitted_flux, runs[-1].flux, rays, unshot_limit, on_part)
+        residuals += more
     fluxes = np.stack([run.flux for run in runs]) / np.maximum(column, 1e-300)
     errors = fluxes.std(axis=0, ddof=1) / replicates**0.5 if replicates > 1 else None
     energy = Energy(*(float(np.mean([getattr(run.energy, name) for run in runs])) for name in Energy.__slots__))
     return Solution(
         radiosity=fluxes.mean(axis=0),
-        residuals=_mean_residuals(runs),
+        residuals=residuals,
         energy=energy,
         rays=sum(run.rays for run in runs),
         solver="stochastic",
@@ -108,10 +117,10 @@ class _Shooting:
 
 
 def _incremental(shooting, emitted, rays, unshot_limit, on_step) -> _Run:
-    """Shoot what is unshot until little is left, or go on by regular iterations where those are fewer rays."""
+    """Shoot what is unshot until little is left, or it is clear that this would take too many rays."""
     total, unshot = emitted.copy(), emitted
     first = float(emitted.sum())
-    residuals, escaped, absorbed = [], 0.0, 0.0
+    residuals, escaped, absorbed, is_slow = [], 0.0, 0.0, False
     while first > 0:
         left = float(unshot.sum()) / first
         residuals.append(left)
@@ -119,8 +128,9 @@ def _incremental(shooting, emitted, rays, unshot_limit, on_step) -> _Run:
             break
         on_step(np.log(max(left, 1e-300)) / np.log(unshot_limit))
         kept = min(left / residuals[-2], 1.0) if len(residuals) > 1 else 0.0
-        if len(residuals) > LEAST_STEPS and left > (BURN_IN + LEAST_MEANS) * (1 - kept):
-            return _regular(shooting, emitted, total, rays, unshot_limit, residuals, on_step)
+        is_slow = len(residuals) > LEAST_STEPS and left > REGULAR_COST * (1 - kept)
+        if is_slow:
+            break
         reflected, gone = shooting.shoot(unshot, max(int(rays * left), LEAST_RAYS))
         # what neither was reflected nor left was taken by surfaces, or by tinted glass
         absorbed += float(unshot.sum() - gone.sum() - reflected.sum())
@@ -128,37 +138,60 @@ def _incremental(shooting, emitted, rays, unshot_limit, on_step) -> _Run:
         total = total + reflected
         unshot = reflected
     energy = Energy(first, absorbed, escaped, float(unshot.sum()))
-    return _Run(total, tuple(residuals), energy, shooting.rays, shooting.bound(unshot))
+    return _Run(total, tuple(residuals), energy, shooting.rays, shooting.bound(unshot), is_slow)
 
 
-def _regular(shooting, emitted, flux, rays, unshot_limit, residuals, on_step) -> _Run:
-    """Iterate on all flux, Phi <- M + rho F^T Phi, scaled in each channel to keep the balance; average the end.
+def _regular(shootings, emitted, flux, rays, unshot_limit, on_step):
+    """Iterate on all flux from ``flux``, in windows of twice the length until light has its shape; average the last.
 
-    Scaling ends at once the mode that is slow, the mean light, whatever the reflectance (aggregation, with the light
-    itself as the aggregate's shape); the shape goes on by bounces, which forget it fast. Both sums of the scale are of
-    positive fluxes, so it has no noise to speak of.
+    Scaling ends at once the mode that is always slow, the mean light (aggregation, with the light itself as the
+    aggregate's shape). Other modes may be slow as well: what two rooms with a small door differ by. While they still
+    move, replicates change alike from window to window, and by chance only when they do not.
+
+    Returns the runs, and the residuals after each window: imbalance of fluxes, or the change of shape where larger.
     """
+    fluxes, before, residuals, length, done = [flux] * len(shootings), None, (), WINDOW, 0
+    while True:
+        runs = []
+        for replicate, shooting in enumerate(shootings):
+            run, fluxes[replicate] = _window(shooting, emitted, fluxes[replicate], rays, length)
+            runs.append(run)
+            on_step((done + length * (replicate + 1) / len(shootings)) / (4 * LONGEST))
+        done += length
+        drift = _drift(before, [run.flux for run in runs]) if before else 1.0
+        residuals += (max(drift, float(np.mean([run.residuals[0] for run in runs]))),)
+        if before and (residuals[-1] <= unshot_limit or length >= LONGEST):
+            return runs, residuals
+        length = 2 * length if before else length
+        before = [run.flux for run in runs]
+
+
+def _window(shooting, emitted, flux, rays, length):
+    """The mean of some iterations Phi <- M + rho F^T Phi, scaled in each channel to keep the balance; and the last."""
     shot = emitted.sum(axis=0)
-    begun, means = len(residuals), 0
     sum_shot, sum_reflected, sum_escaped = np.zeros_like(emitted), np.zeros_like(emitted), np.zeros(len(shot))
-    while means < MOST_MEANS:
+    for _ in range(length):
         reflected, gone = shooting.shoot(flux, rays)
-        scale = _scale(shot, flux, reflected)
-        if len(residuals) - begun >= BURN_IN:
-            means += 1
-            sum_shot, sum_reflected, sum_escaped = sum_shot + flux, sum_reflected + reflected, sum_escaped + gone
-            accounted = (sum_shot.sum(axis=0) - sum_reflected.sum(axis=0)) / means
-        else:
-            accounted = flux.sum(axis=0) - reflected.sum(axis=0)
-        residuals.append(float(np.abs(shot - accounted).sum() / shot.sum()))
-        on_step((len(residuals) - begun) / (BURN_IN + MOST_MEANS))
-        if means >= LEAST_MEANS and residuals[-1] <= unshot_limit:
-            break
-        flux = emitted + scale * reflected
+        sum_shot, sum_reflected, sum_escaped = sum_shot + flux, sum_reflected + reflected, sum_escaped + gone
+        flux = emitted + _scale(shot, flux, reflected) * reflected
+    imbalance = np.abs(shot - (sum_shot.sum(axis=0) - sum_reflected.sum(axis=0)) / length).sum() / shot.sum()
     scale = _scale(shot, sum_shot, sum_reflected)
     total, escaped = emitted + scale * sum_reflected, float((scale * sum_escaped).sum())
     energy = Energy(float(shot.sum()), float(shot.sum()) - escaped, escaped, 0.0)
-    return _Run(total, tuple(residuals), energy, shooting.rays, shooting.bound(total - scale * sum_shot))
+    bound = shooting.bound(total - scale * sum_shot)
+    return _Run(total, (float(imbalance),), energy, shooting.rays, bound), flux
+
+
+def _drift(before, after):
+    """Relative change that replicates have in common, 0 where it is no more than chance; of one alone, all of it."""
+    changes = [now - then for then, now in zip(before, after)]
+    first, other = changes[0], changes[-1]
+    common, size = float((first * other).sum()), float((after[0] * after[-1]).sum())
+    if len(changes) > 1:
+        chance = min(3 / max(np.count_nonzero(after[0].any(axis=1)), 1) ** 0.5, 0.5)
+        if common <= chance * np.linalg.norm(first) * np.linalg.norm(other):
+            return 0.0
+    return (common / max(size, 1e-300)) ** 0.5
 
 
 def _scale(shot, flux, reflected):

@@ -79,6 +79,23 @@ def test_two_rooms_that_absorb_next_to_nothing(solver):
     assert solution.radiosity[3:] == pytest.approx(np.full((3, 3), exact[1]), rel=1e-7)
 
 
+@pytest.mark.parametrize(("fraction", "rho"), [(0.01, 0.95), (0.1, 0.99)])
+def test_two_bright_rooms_by_chance(fraction, rho):
+    """By incremental shooting at 0.95; at 0.99 regular iterations go on until the rooms have stopped to fill up."""
+    exact = two_spheres_radiosity(fraction, rho)
+    solution = solve("stochastic", two_spheres(fraction), [rho], [1.0] * 3 + [0.0] * 3, 1e-6, rays=10**8)
+    # 1e8 rays, 1e6 of which pass the port: 1e-3 of noise, tenfold as rooms exchange light and keep most
+    assert solution.radiosity == pytest.approx(np.repeat(np.tile(exact, (3, 1)).T.reshape(6, 1), 3, 1), rel=0.005)
+
+
+def test_stochastic_says_when_it_has_not_got_there():
+    """Balanced fluxes alone would not show it: the second room takes 1e3 iterations to fill up."""
+    exact = two_spheres_radiosity(1e-3, 0.9999)
+    solution = solve("stochastic", two_spheres(1e-3), [0.9999], [1.0] * 3 + [0.0] * 3, 1e-3, rays=10**8)
+    assert solution.radiosity[3, 0] < 0.5 * exact[1]
+    assert solution.residuals[-1] > 0.01
+
+
 def test_progressive_refinement_says_when_it_has_not_got_there():
     """Ambient light is one for the whole scene: what two such rooms differ by is slow, and the bound says so."""
     exact = two_spheres_radiosity(1e-3, 0.9999)
@@ -163,15 +180,17 @@ def test_furnace_by_rays(room, rho):
     relative = solution.radiosity[::2] * (1 - rho)
     # the flux balance sets the mean; a ray in ten million may slip through an edge, which 1e4 multiplies
     assert np.average(relative, weights=patches.areas, axis=0) == pytest.approx([1] * 3, rel=5e-3)
-    # at least eight means of all rays: a patch's arrivals, independent, are a share of 8 rays a patch times 128
-    noise = 1 / np.sqrt(8 * rays * patches.areas.min() / patches.areas.sum())
+    # at least ten iterations of all rays are averaged, and a patch's arrivals are its share by area of those
+    noise = 1 / np.sqrt(10 * rays * patches.areas.min() / patches.areas.sum())
     assert np.sqrt(np.mean((relative - 1) ** 2)) < noise
     assert solution.residuals[-1] <= 1e-3
-    assert solution.rays < 25 * rays  # incremental shooting would take 1 / (1 - rho) times the first step's
+    assert (
+        solution.rays < 50 * rays
+    )  # two or three windows; incremental shooting would take 1 / (1 - rho) times the first step's
     assert (solution.radiosity[1::2] == 0).all()
 
 
-@pytest.mark.parametrize("rho", [0.5, 0.95])  # by incremental shooting, and by regular iterations
+@pytest.mark.parametrize("rho", [0.5, 0.99])  # by incremental shooting, and by regular iterations
 def test_the_standard_error_is_that_of_the_radiosities(systems, rho):
     """Against a dense solution of the same matrix, RMS error over RMS standard error is near 1."""
     system = systems["L"]
@@ -180,7 +199,7 @@ def test_the_standard_error_is_that_of_the_radiosities(systems, rho):
     solution = solve("stochastic", system, [rho], emitted, 1e-4, rays=64 * len(system[1]))
     areas = system[1][:, None]
     found = np.sqrt((areas * (solution.radiosity - exact) ** 2).sum() / (areas * solution.radiosity**2).sum())
-    # four replicates: variances of 3 degrees of freedom averaged over hundreds of patches that are correlated a little
+    # two replicates: squares of one difference each, averaged over hundreds of patches that are correlated a little
     assert 0.75 < found / solution.relative_standard_error(system[1]) < 1.35
 
 
