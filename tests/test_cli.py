@@ -60,6 +60,7 @@ def test_help_waits_for_neither_blender_nor_numpy():
         (["--target", "vertex"], "target", "vertex"),
         (["--method", "hemicube"], "method", "hemicube"),
         (["--solver", "progressive"], "solver", "progressive"),
+        (["--solver", "conjugate-gradient"], "solver", "conjugate-gradient"),
         (["--error", "0.05"], "error", 0.05),
         (["--time-limit", "12"], "time_limit", 12.0),
         (["--texels", "65536"], "texels", 65536),

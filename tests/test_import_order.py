@@ -14,21 +14,9 @@ MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
     *("settings", "scene", "textures", "emitters", "report", "workers", "kernel", "patches", "transport"),
-    *(
-        "solver",
-        "receivers",
-        "texel_light",
-        "guides",
-        "radiosity",
-        "charts",
-        "cut",
-        "flatten",
-        "packing",
-        "unwrap",
-        "texels",
-        "smoothing",
-    ),
-    *("gather", "lightmap", "bake"),
+    *("exchange", "solver", "dense", "conjugate_gradient", "progressive", "stochastic"),
+    *("receivers", "texel_light", "guides", "radiosity"),
+    *("charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing", "probes", "gather", "lightmap", "bake"),
 )
 BLENDER = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "idprop"}
 

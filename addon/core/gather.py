@@ -18,6 +18,8 @@ from .texel_light import NO_TEXEL_LIGHT, TexelLight
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
 LOOK_RAYS = 4  # of a replicate, for the first look at the texels' light, which further rays then see
 NEAR = 10.0  # texels: rays that hit from nearer do not take a texel's light
+NEAR_SHARE = 1 / 16  # of the scene, at the most: in a coarse lightmap all would be near
+FAR = 3.3  # times as far do rays go on from patches, where texels have a light of their own: few are left that need it
 FIRST_RAYS = 8  # of a replicate, in the first pass
 GROWTH = 4  # every further pass brings those that need it to so many times as many
 MOST_RAYS = 2048  # of a replicate
@@ -26,7 +28,7 @@ FREE_RAYS = 1 << 26
 DIRECT_PASSES = 3  # each with four times the shadow rays of the one before, for the receivers that need it
 DIRECT_SHARE = 0.5  # of the error that direct light may have
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
-PROBE_RAYS = 128  # of a replicate
+PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
 FURTHER = 2.0  # probes look so many times further before they take a texel's or a patch's light for what is there
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
 
@@ -54,6 +56,11 @@ class Irradiance:
 def shadow_samples(error: float) -> int:
     """Shadow rays of a receiver in penumbra: stratified, so that their error falls nearly as 1 / rays."""
     return int(min(max(2 ** round(np.log2(3.2 / error)), 16), 2048))
+
+
+def probe_rays(error: float) -> int:
+    """Rays of a replicate at a probe: one ray is about as wrong as the light is bright."""
+    return int(min(max(2 ** round(np.log2(1 / (REPLICATES * PROBE_DOUBT * error**2))), 16), 1024))
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +152,8 @@ def _with_texel_light(job: _Job, grid: TexelGrid, direct, seed, on_step):
     rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, LOOK_RAYS, seed, sums, on_step)
     gathered, _ = smoothed(job.kernel.workers, grid, job.receivers, sums / LOOK_RAYS)
     radiosity = (grid.reflectance * (direct + gathered)).astype(np.float32)
-    return replace(job, texel_light=TexelLight(grid.uvs, grid.receivers, radiosity, NEAR * grid.spacing)), rays
+    reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
+    return replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, grid.receivers, radiosity, reach)), rays
 
 
 def _measure(job: _Job, error, seed) -> Measured:
@@ -153,8 +161,9 @@ def _measure(job: _Job, error, seed) -> Measured:
     further = job.looking_further(FURTHER)
     direct, variance, shadow_rays = further.direct(4 * shadow_samples(error), seed)
     sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
-    rays = further.gather(np.arange(len(sums), dtype=np.uint32), 0, PROBE_RAYS, seed, sums)
-    gathered = (sums / PROBE_RAYS) @ LUMINANCE
+    count = probe_rays(error)
+    rays = further.gather(np.arange(len(sums), dtype=np.uint32), 0, count, seed, sums)
+    gathered = (sums / count) @ LUMINANCE
     variance = variance + gathered.var(axis=1, ddof=1) / REPLICATES
     return Measured(direct @ LUMINANCE + gathered.mean(axis=1), variance, shadow_rays + rays)
 

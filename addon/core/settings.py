@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 TARGETS = ("lightmap", "vertex")
 METHODS = ("auto", "hemicube", "monte-carlo")
-SOLVERS = ("auto", "direct", "progressive", "stochastic")
+SOLVERS = ("auto", "direct", "conjugate-gradient", "progressive", "stochastic")
 
 
 class SettingsError(ValueError):
@@ -26,8 +26,8 @@ class BakeSettings:
     ----------
     target : "lightmap" or "vertex"
     method : how form factors are estimated; "auto" is Monte Carlo
-    solver : "auto" is stochastic, or with hemicubes direct or progressive by the number of triangles; the report says
-        which it was
+    solver : "auto" is stochastic, in bright rooms and with hemicubes conjugate-gradient while it fits, and progressive
+        with hemicubes in larger scenes; the report says which it was, and why
     error : target of the local relative RMS error of the irradiance; missed, the report says so [1]
     time_limit : sampling stops after so many seconds, target reached or not [s]; None = no limit
     texels : lightmap size as a number of texels, about

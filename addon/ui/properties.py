@@ -40,8 +40,9 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
         name="Solver",
         description="How the radiosity of the patches is found",
         items=(
-            ("auto", "Automatic", "Choose by the number of patches"),
+            ("auto", "Automatic", "Choose by the size of the scene and how much it reflects"),
             ("direct", "Direct", "Exact; for small scenes only"),
+            ("conjugate-gradient", "Conjugate Gradient", "Exact; for medium scenes, and for very bright materials"),
             ("progressive", "Progressive", "Shoot from the brightest patch first"),
             ("stochastic", "Stochastic", "For large scenes; always uses Monte Carlo rays"),
         ),

@@ -38,15 +38,31 @@ static size_t choose_light(const float *importances, size_t count, float total, 
     return chosen;
 }
 
+/*
+ * The k-th sample of a light. Where the light has a closed form, samples only say which share of it is seen, so one
+ * that falls below the horizon, or on a triangle's dark side, is drawn again: else a light of which no sample could
+ * shine would be lost.
+ */
+static bool sample_above_horizon(const pl_lights *lights, vec3 point, vec3 normal, size_t light, uint32_t seed,
+                                 uint32_t k, pl_light_sample *out_sample) {
+    const uint32_t tries = light_has_closed_form(lights, light) ? 32 : 1;
+    for (uint32_t try = 0; try < tries; ++try) {
+        const uint32_t try_seed = try ? hash_pair(seed, 0x40000000u + try) : seed;
+        if (light_sample(lights, light, point, normal, sobol(k, 0, try_seed), sobol(k, 1, try_seed), out_sample))
+            return true;
+    }
+    return false;
+}
+
 bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_light_balls *balls, float *importances,
-                     vec3 origin, vec3 normal, const float random[3], float out_rgb[3]) {
+                     vec3 origin, vec3 normal, uint32_t seed, float out_rgb[3]) {
     pl_light_sample sample;
     out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
     const float total = light_importances(lights, balls, origin, normal, importances);
     if (total <= 0)
         return false;
-    const size_t chosen = choose_light(importances, lights->count, total, random[0]);
-    if (!light_sample(lights, chosen, origin, normal, random[1], random[2], &sample))
+    const size_t chosen = choose_light(importances, lights->count, total, sobol(0, 2, seed));
+    if (!sample_above_horizon(lights, origin, normal, chosen, seed, 0, &sample))
         return false;
     /* the sample's own estimate has no bound close to a lamp: where there is a closed form the ray only says whether
        the lamp is seen */
@@ -87,29 +103,12 @@ typedef struct light_sums {
     uint32_t visible, taken;
 } light_sums;
 
-/*
- * The k-th sample of a light. Where the light has a closed form, samples only say which share of it is seen, so one
- * that falls below the horizon, or on a triangle's dark side, is drawn again: else a light of which no sample could
- * shine would be lost.
- */
-static bool sample_above_horizon(const direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed,
-                                 uint32_t k, pl_light_sample *out_sample) {
-    const uint32_t tries = light_has_closed_form(job->lights, light) ? 32 : 1;
-    for (uint32_t try = 0; try < tries; ++try) {
-        const uint32_t try_seed = try ? hash_pair(seed, 0x40000000u + try) : seed;
-        if (light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 0, try_seed),
-                         sobol(k, 1, try_seed), out_sample))
-            return true;
-    }
-    return false;
-}
-
 static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed, uint32_t first,
                          uint32_t end, light_sums *io_sums) {
     for (uint32_t k = first; k < end; ++k) {
         pl_light_sample sample;
         ++io_sums->taken;
-        if (!sample_above_horizon(job, frame, light, seed, k, &sample))
+        if (!sample_above_horizon(job->lights, frame->origin, frame->shading, light, seed, k, &sample))
             continue;
         for (int c = 0; c < 3; ++c)
             io_sums->all[c] += sample.irradiance[c];

@@ -7,10 +7,10 @@
 
 /*
  * One-sample estimate of the direct irradiance at a point off a surface: one light in proportion to what it
- * would give, one shadow ray. Three random numbers in [0, 1); `importances` is room for one number a light.
+ * would give, one shadow ray; `importances` is room for one number a light.
  * Returns whether a ray was traced.
  */
 bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_light_balls *balls, float *importances,
-                     vec3 origin, vec3 normal, const float random[3], float out_rgb[3]);
+                     vec3 origin, vec3 normal, uint32_t seed, float out_rgb[3]);
 
 #endif

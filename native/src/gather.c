@@ -62,10 +62,10 @@ static vec3 hit_normal(const pl_scene *scene, const pl_hit *hit, size_t side) {
 static void sample_direct(gather_job *job, const pl_hit *hit, size_t side, ray_random *random, const float *weight,
                           float *io_sum) {
     const vec3 normal = hit_normal(job->scene, hit, side);
-    const float numbers[3] = {draw(random), draw(random), draw(random)};
     float rgb[3];
-    job->rays += direct_at_point(job->scene, job->lights, &job->balls, job->importances,
-                                 hit_point(job->scene, hit, normal), normal, numbers, rgb);
+    job->rays +=
+        direct_at_point(job->scene, job->lights, &job->balls, job->importances, hit_point(job->scene, hit, normal),
+                        normal, hash_pair(random->seed, ++random->drawn), rgb);
     for (int k = 0; k < 3; ++k)
         io_sum[k] += rgb[k] * weight[k] * job->solution->reflectance[3 * (side / 2) + (size_t)k];
 }
@@ -116,8 +116,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
             return;
         }
-        const bool is_mixed = seen || solution->kinds[side] == PL_SIDE_MIXED;
-        if (is_mixed)
+        if (seen || solution->kinds[side] == PL_SIDE_MIXED)
             sample_direct(job, &hit, side, &random, weight, io_sum);
         else
             add(io_sum, solution->direct + 3 * side, weight);

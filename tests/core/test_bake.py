@@ -30,6 +30,7 @@ ROUTES = [
     ("monte-carlo", "stochastic"),
     ("monte-carlo", "progressive"),
     ("monte-carlo", "direct"),
+    ("monte-carlo", "conjugate-gradient"),
     ("hemicube", "progressive"),
     ("hemicube", "direct"),
 ]
@@ -136,7 +137,7 @@ def bake_bytes(scene, **settings):
     return (result.lightmap.pixels if result.lightmap else result.corner_colours).tobytes()
 
 
-@pytest.mark.parametrize("solver", ["direct", "progressive", "stochastic"])
+@pytest.mark.parametrize("solver", ["direct", "conjugate-gradient", "progressive", "stochastic"])
 @pytest.mark.parametrize("rho", [0.5, 0.8])
 def test_furnace(solver, rho):
     """Every wall of a closed box glows with L: E = pi L / (1 - rho) at every receiver, in every channel."""

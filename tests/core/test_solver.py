@@ -3,14 +3,9 @@
 import numpy as np
 import pytest
 
+from addon.core.dense import DIRECT_LIMIT, require_direct_size, solve_direct
+from addon.core.progressive import ProgressiveRefinement, solve_progressive
 from addon.core.settings import SettingsError
-from addon.core.solver import (
-    DIRECT_LIMIT,
-    ProgressiveRefinement,
-    require_direct_size,
-    solve_direct,
-    solve_progressive,
-)
 
 # three patches of one area; the rest of what the rows lack escapes
 FORM_FACTORS = np.array([[0, 0.4, 0.6], [0.4, 0, 0.2], [0.6, 0.2, 0]])

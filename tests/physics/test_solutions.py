@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from addon.core.dense import solve_direct
 from addon.core.patches import subdivide
+from addon.core.progressive import solve_progressive
 from addon.core.radiosity import UNSHOT_LIMIT
 from addon.core.scene import Material
-from addon.core.solver import solve_direct, solve_progressive, solve_stochastic
+from addon.core.stochastic import solve_stochastic
 from addon.core.transport import HemicubeFormFactors, MonteCarloFormFactors
 from tests.scenes import box, closed_box, cornell_box, kernel_of, rectangle, room_with_occluder, scene_of
 
