@@ -13,8 +13,20 @@ ADDON = ROOT / "addon"
 MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "core": {"core"}}
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
-    *("settings", "scene", "textures", "emitters", "report", "workers", "kernel", "patches", "transport"),
-    *("solver", "receivers", "radiosity", "charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing"),
+    *("ranges", "settings", "scene", "sound_faces", "textures", "emitters", "report", "workers", "kernel", "patches"),
+    *(
+        "transport",
+        "solver",
+        "receivers",
+        "radiosity",
+        "charts",
+        "cut",
+        "flatten",
+        "packing",
+        "unwrap",
+        "texels",
+        "smoothing",
+    ),
     *("gather", "lightmap", "bake"),
 )
 BLENDER = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "idprop"}

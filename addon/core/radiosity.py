@@ -24,6 +24,7 @@ SMALL = 0.25  # of a full-size patch's area: smaller ones are measured at one po
 PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 1
 PATCH_SKY_RAYS = 4  # of each point
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
+MOST_REFLECTANCE = 0.9999  # while light is solved for: in a closed room that absorbs nothing it has no bound
 MIXED = 0.5  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
 BRIGHT = 20.0  # times the median radiosity: brighter sides are sampled as lights, which few gather rays would find
 BRIGHT_SHARE = 0.005  # of all area that they may be: where much is bright, gather rays find it well
@@ -158,7 +159,7 @@ def _as_sources(scene, kernel, patches, emitters, radiosity, bright):
 
 
 def _solve(kernel, patches, emitted, solver, method, settings, on_step) -> Solution:
-    areas, reflectance = patches.side_areas, patches.side_reflectance
+    areas, reflectance = patches.side_areas, np.minimum(patches.side_reflectance, MOST_REFLECTANCE)
     if solver == "stochastic":
         rays = int(min(max(8 * len(emitted), 1 << 20) * (0.05 / settings.error), 1 << 25))
         return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, settings.seed, on_step)

@@ -156,6 +156,25 @@ static PyObject *patch_points(PyObject *self, PyObject *args) {
     return door_result(status);
 }
 
+/* Patches that were cut from this scene's triangles; NULL with an exception where they were not. */
+static const pl_patches *patches_of(const pl_scene *scene, PyObject *capsule) {
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsule, PATCHES) : NULL;
+    if (patches && !pl_patches_fit(patches, scene)) {
+        PyErr_SetString(PyExc_ValueError, "patches: cut from another number of triangles than the scene has");
+        return NULL;
+    }
+    return patches;
+}
+
+/* Whether first .. first + count - 1 are within `end`; an exception where not. */
+static bool range_fits(uint64_t first, uint64_t count, uint64_t end) {
+    const bool fits = first <= end && count <= end - first;
+    if (!fits)
+        PyErr_Format(PyExc_ValueError, "first, count: %zu and %zu leave 0 .. %zu", (size_t)first, (size_t)count,
+                     (size_t)end);
+    return fits;
+}
+
 static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
     PyObject *capsules[2], *objects[2];
     unsigned rays, seed;
@@ -164,7 +183,7 @@ static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
     if (!PyArg_ParseTuple(args, "OOOIIO", &capsules[0], &capsules[1], &objects[0], &rays, &seed, &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = patches_of(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
@@ -192,7 +211,7 @@ static PyObject *form_factors_hemicube(PyObject *self, PyObject *args) {
                           &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = patches_of(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
@@ -220,10 +239,10 @@ static PyObject *openness(PyObject *self, PyObject *args) {
                           &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = patches_of(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"reaches", 'f', 1, sides, false, {0}}, {"out_openness", 'f', 1, sides, true, {0}}};
-    if (!patches || !door_arrays(objects, arrays, 2))
+    if (!patches || !range_fits((size_t)first, (size_t)count, (size_t)sides) || !door_arrays(objects, arrays, 2))
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
@@ -232,6 +251,16 @@ static PyObject *openness(PyObject *self, PyObject *args) {
 
     door_release(arrays, 2);
     Py_RETURN_NONE;
+}
+
+/* Whether the sides' runs of rays rise from 0 and hold the range asked for; an exception where not. */
+static bool rays_are_owned(const uint64_t *first_rays, size_t sides, uint64_t first, uint64_t count) {
+    bool rises = first_rays[0] == 0;
+    for (size_t side = 0; side < sides; ++side)
+        rises &= first_rays[side] <= first_rays[side + 1];
+    if (!rises)
+        PyErr_SetString(PyExc_ValueError, "first_rays: expected numbers that rise from 0");
+    return rises && range_fits(first, count, first_rays[sides]);
 }
 
 static PyObject *shoot(PyObject *self, PyObject *args) {
@@ -243,7 +272,7 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
                           &count, &seed, &objects[3], &objects[4]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = patches_of(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"first_rays", 'Q', 1, sides + 1, false, {0}},
                            {"first_samples", 'I', 1, sides, false, {0}},
@@ -252,6 +281,10 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
                            {"io_escaped", 'Q', 3, 1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 5))
         return NULL;
+    if (!rays_are_owned(arrays[0].view.buf, (size_t)sides, first, count)) {
+        door_release(arrays, 5);
+        return NULL;
+    }
 
     Py_BEGIN_ALLOW_THREADS
     pl_shoot(scene, patches, arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf, first, count, seed,
@@ -315,7 +348,7 @@ static PyObject *gather(PyObject *self, PyObject *args) {
                           &objects[SUMS]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = patches_of(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"radiosity", 'f', 3, sides, false, {0}},
                            {"direct", 'f', 3, sides, false, {0}},
@@ -381,6 +414,15 @@ static PyObject *direct(PyObject *self, PyObject *args) {
     return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
 }
 
+static bool grid_is_valid(const pl_texel_grid *grid, size_t receivers) {
+    if (grid->width < 0 || grid->height < 0)
+        return false;
+    for (size_t i = 0; i < (size_t)grid->width * (size_t)grid->height; ++i)
+        if (grid->receivers[i] >= 0 && (size_t)grid->receivers[i] >= receivers)
+            return false;
+    return true;
+}
+
 static PyObject *smooth(PyObject *self, PyObject *args) {
     enum { VALUES = RECEIVER_ARRAY_COUNT + 1, VARIANCES, OUT_VALUES, OUT_VARIANCES, ARRAYS };
     PyObject *receiver_arrays, *objects[ARRAYS];
@@ -401,6 +443,13 @@ static PyObject *smooth(PyObject *self, PyObject *args) {
         return NULL;
     const pl_receivers receivers = receivers_of(arrays);
     grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
+    if (!grid_is_valid(&grid, receivers.count) ||
+        !range_fits((size_t)first_row, (size_t)row_count, (size_t)grid.height)) {
+        if (!PyErr_Occurred())
+            PyErr_SetString(PyExc_ValueError, "grid: names receivers that are not there, or its size is none");
+        door_release(arrays, ARRAYS);
+        return NULL;
+    }
 
     Py_BEGIN_ALLOW_THREADS
     pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value, first_row,

@@ -129,6 +129,8 @@ pl_status pl_gather(const pl_scene *scene, const pl_patches *patches, const pl_s
     for (size_t i = 0; i < count; ++i)
         if (!receiver_is_valid(scene, receivers, selected[i]))
             return PL_ERR_ARGUMENT;
+    if (!lights_are_valid(lights) || !pl_patches_fit(patches, scene))
+        return PL_ERR_ARGUMENT;
     gather_job job = {.scene = scene, .patches = patches, .solution = solution, .lights = lights};
     job.importances = malloc(sizeof(float) * (lights->count + 1));
     if (!job.importances || !light_balls_create(lights, &job.balls)) {
