@@ -1,6 +1,9 @@
-"""How much chance tests take: a quick share of their random examples in `make test`, all of them in `make fuzz`."""
+"""How much chance tests take, and which kernel: by what `make test`, `make fuzz` and `make sanitize` set."""
 
+import importlib.machinery
+import importlib.util
 import os
+import sys
 
 from hypothesis import HealthCheck, settings
 
@@ -13,3 +16,17 @@ COMMON = {
 settings.register_profile("quick", max_examples=200, derandomize=True, **COMMON)
 settings.register_profile("fuzz", max_examples=10_000, **COMMON)
 settings.load_profile(os.environ.get("PATCHLIGHT_EXAMPLES", "quick"))
+
+
+def load_kernel(path):
+    """Put another build of the kernel in the place of the product's, before anything imports it."""
+    name = "addon.core._kernel"
+    loader = importlib.machinery.ExtensionFileLoader(name, path)
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    loader.exec_module(module)
+
+
+if "PATCHLIGHT_TEST_KERNEL" in os.environ:
+    load_kernel(os.path.abspath(os.environ["PATCHLIGHT_TEST_KERNEL"]))

@@ -414,10 +414,14 @@ static PyObject *direct(PyObject *self, PyObject *args) {
     return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
 }
 
+static Py_ssize_t grid_size(const pl_texel_grid *grid) {
+    return grid->width > 0 && grid->height > 0 ? (Py_ssize_t)grid->width * grid->height : 0;
+}
+
 static bool grid_is_valid(const pl_texel_grid *grid, size_t receivers) {
     if (grid->width < 0 || grid->height < 0)
         return false;
-    for (size_t i = 0; i < (size_t)grid->width * (size_t)grid->height; ++i)
+    for (size_t i = 0; i < (size_t)grid_size(grid); ++i)
         if (grid->receivers[i] >= 0 && (size_t)grid->receivers[i] >= receivers)
             return false;
     return true;
@@ -434,7 +438,7 @@ static PyObject *smooth(PyObject *self, PyObject *args) {
                           &stops_on_value, &first_row, &row_count, &objects[OUT_VALUES], &objects[OUT_VARIANCES]))
         return NULL;
     door_array arrays[] = {RECEIVER_ARRAYS(0),
-                           {"grid", 'i', 1, (Py_ssize_t)grid.width * grid.height, false, {0}},
+                           {"grid", 'i', 1, grid_size(&grid), false, {0}},
                            {"values", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
                            {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
                            {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}},

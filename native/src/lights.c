@@ -38,6 +38,12 @@ static area_light area_of(const float *p) {
 
 static mesh_light mesh_of(const float *p) { return (mesh_light){vec3_from(p), p[3], p[4], (size_t)p[5], (size_t)p[6]}; }
 
+/* How far along itself a shadow ray goes to a lamp that may lie in a face. */
+static const float far_of_face = 0.999999f;
+
+/* Eight units in the last place of a point's largest coordinate, as in point_off_triangle. */
+static float rounding_of(vec3 p) { return 9.5367431640625e-7f * fmaxf(fabsf(p.x), fmaxf(fabsf(p.y), fabsf(p.z))); }
+
 static const float *parameters_of(const pl_lights *lights, size_t light) {
     return lights->parameters + PL_LIGHT_FLOATS * light;
 }
@@ -100,7 +106,7 @@ static bool sample_point_light(const float *p, vec3 point, vec3 normal, float x,
 
     if (light.radius <= 0) {
         out->direction = to;
-        out->far = 1;
+        out->far = far_of_face;
         const float cosine = vec3_dot(to, normal) / distance;
         factor = cosine * cone_share(&light, vec3_scale(to, -1 / distance)) / (distance * distance);
     } else if (light.is_soft > 0) {
@@ -197,12 +203,13 @@ static bool sample_area(const float *p, vec3 point, vec3 normal, float x, float 
         a = radius * cosf(angle);
         b = radius * sinf(angle);
     }
+    /* off the lamp's plane, in which a ceiling may lie that must not be in the way */
+    const vec3 lamp_normal = vec3_unit(vec3_cross(light.axis_u, light.axis_v));
     const vec3 target = vec3_mul_add(light.axis_u, a, vec3_mul_add(light.axis_v, b, light.centre));
-    out->direction = vec3_sub(target, point);
-    out->far = 1;
+    out->direction = vec3_sub(vec3_mul_add(lamp_normal, rounding_of(target), target), point);
+    out->far = far_of_face;
     const float square = vec3_dot(out->direction, out->direction);
     const float reach = sqrtf(square);
-    const vec3 lamp_normal = vec3_unit(vec3_cross(light.axis_u, light.axis_v));
     const float lamp_cosine = -vec3_dot(out->direction, lamp_normal) / fmaxf(reach, 1e-30f);
     const float cosine = vec3_dot(out->direction, normal) / fmaxf(reach, 1e-30f);
     if (cosine <= 0 || lamp_cosine <= 0)
@@ -278,11 +285,10 @@ static bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec
     vec3 lamp_normal = vec3_unit(twice_area);
     if (vec3_dot(vec3_sub(point, target), lamp_normal) < 0)
         lamp_normal = vec3_scale(lamp_normal, -1);
-    const float largest = fmaxf(fabsf(target.x), fmaxf(fabsf(target.y), fabsf(target.z)));
-    target = vec3_mul_add(lamp_normal, 9.5367431640625e-7f * fmaxf(largest, light.radius), target);
+    target = vec3_mul_add(lamp_normal, fmaxf(rounding_of(target), 9.5367431640625e-7f * light.radius), target);
 
     out->direction = vec3_sub(target, point);
-    out->far = 0.999999f;
+    out->far = far_of_face;
     const float square = vec3_dot(out->direction, out->direction);
     const float reach = fmaxf(sqrtf(square), 1e-30f);
     const float lamp_cosine = -vec3_dot(out->direction, lamp_normal) / reach;
