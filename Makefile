@@ -67,8 +67,9 @@ test: kernel
 	$(BIN)/python -m pytest
 
 # every example is new at each run; what fails is printed with how to repeat it
+EXAMPLES := 10000
 fuzz: kernel
-	PATCHLIGHT_EXAMPLES=fuzz $(BIN)/python -m pytest --capture=no --hypothesis-show-statistics tests/core/test_random_*.py
+	PATCHLIGHT_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest --capture=no --hypothesis-show-statistics tests/core/test_random_*.py
 
 # ---- checks ----
 
