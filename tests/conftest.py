@@ -18,6 +18,11 @@ settings.register_profile("fuzz", max_examples=int(os.environ.get("PATCHLIGHT_EX
 settings.load_profile("fuzz" if "PATCHLIGHT_EXAMPLES" in os.environ else "quick")
 
 
+def pytest_configure():
+    """Keep the terminal for what a watchdog has to say: pytest takes standard error away from tests."""
+    os.environ["PATCHLIGHT_TEST_STDERR"] = str(os.dup(2))
+
+
 def load_kernel(path):
     """Put another build of the kernel in the place of the product's, before anything imports it."""
     name = "addon.core._kernel"

@@ -16,7 +16,7 @@ from .settings import SettingsError
 DIRECT_LIMIT = 6000  # unknowns: the dense system takes 8 n^2 bytes a channel in work
 # guards for closed rooms that absorb next to nothing; what is left unshot then is in the report
 MOST_SWEEPS, LEAST_SHOTS = 64, 20_000  # shots of progressive refinement: so many a side, and these at least
-MOST_WORK = 256  # rays of stochastic Jacobi, in those of its first step: 0.99 everywhere takes 100
+MOST_WORK = 128  # rays of stochastic Jacobi, in those of its first step: 0.99 everywhere takes 100
 FULL = 1 << 62  # what all flux of one step comes to, in fixed point
 
 

@@ -4,6 +4,7 @@ A few hundred in `make test`, ten thousand in `make fuzz`.
 """
 
 import faulthandler
+import os
 from contextlib import contextmanager
 
 import numpy as np
@@ -48,7 +49,8 @@ def bake_settings(draw):
 @contextmanager
 def watched():
     """A test that hangs cannot fail: the process ends with a traceback of all threads instead."""
-    faulthandler.dump_traceback_later(HANG, exit=True)
+    terminal = int(os.environ["PATCHLIGHT_TEST_STDERR"])  # tests/conftest.py
+    faulthandler.dump_traceback_later(HANG, exit=True, file=terminal)
     try:
         yield
     finally:
