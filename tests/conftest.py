@@ -13,7 +13,7 @@ COMMON = {
     "print_blob": True,
     "suppress_health_check": [HealthCheck.too_slow, HealthCheck.data_too_large],
 }
-settings.register_profile("quick", max_examples=200, derandomize=True, **COMMON)
+settings.register_profile("quick", max_examples=150, derandomize=True, **COMMON)
 settings.register_profile("fuzz", max_examples=int(os.environ.get("PATCHLIGHT_EXAMPLES", "1")), **COMMON)
 settings.load_profile("fuzz" if "PATCHLIGHT_EXAMPLES" in os.environ else "quick")
 
