@@ -1,5 +1,7 @@
 # make bake   set everything up, bake the demo, say where the pictures are
 # make test   set everything up, run the tests
+# make fuzz   ten thousand random scenes baked whole (half an hour), and random calls of the kernel
+# make sanitize  the core's and the physics' tests over a kernel with address and undefined-behaviour checks
 # make check  linters, formatters, C tests under sanitizers
 # make zip    the Blender extension, one zip per platform, validated
 # make clean  remove what these made (.venv stays; `make distclean` removes it too)
@@ -20,7 +22,7 @@ WARNINGS := -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Werror
 SANITIZE := -std=c11 -O1 -g -ffp-contract=off -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
 C_TESTS := $(patsubst tests/native/%.c,$(BUILD)/native/%,$(wildcard tests/native/test_*.c))
 
-.PHONY: bake test check lint native-tests kernel zip format clean distclean
+.PHONY: bake test fuzz sanitize check lint native-tests kernel zip format clean distclean
 .DELETE_ON_ERROR:
 
 # ---- set-up: each stamp is newer than what it was made from ----
@@ -64,6 +66,11 @@ bake: kernel
 test: kernel
 	$(BIN)/python -m pytest
 
+# every example is new at each run; what fails is printed with how to repeat it
+EXAMPLES := 10000
+fuzz: kernel
+	PATCHLIGHT_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest --capture=no --hypothesis-show-statistics tests/core/test_random_*.py
+
 # ---- checks ----
 
 check: lint native-tests
@@ -89,6 +96,20 @@ native-tests: $(C_TESTS) | $(VENV)/.installed
 	done
 FIND_EMBREE := import glob, importlib.util as u, pathlib as p; \
     print(glob.glob(str(p.Path(u.find_spec('embreex').origin).parents[1] / 'embreex.libs' / 'libembree4*'))[0])
+
+# The same door as in the product, but built apart from it: tests/conftest.py loads it in the other's place.
+SANITIZED := $(BUILD)/sanitized/_kernel.abi3.so
+$(SANITIZED): $(KERNEL_SOURCES) $(DOOR_SOURCES) $(KERNEL_HEADERS) | $(VENV)/.installed
+	@mkdir -p $(@D)
+	$(CC) $(SANITIZE) -fsanitize=float-cast-overflow -fPIC -shared -fvisibility=hidden -DPy_LIMITED_API=0x030B0000 \
+	    -Inative/include -Inative/src -isystem $$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("include"))') \
+	    $(KERNEL_SOURCES) $(DOOR_SOURCES) -o $@ -lm -ldl -lpthread
+
+# Python itself is not built for it, so the sanitizer's library comes first by hand; Python frees nothing at its end.
+sanitize: kernel $(SANITIZED)
+	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0:halt_on_error=1:quarantine_size_mb=16 \
+	    UBSAN_OPTIONS=print_stacktrace=1 PYTHONMALLOC=malloc PATCHLIGHT_TEST_KERNEL=$(SANITIZED) \
+	    $(BIN)/python -m pytest --capture=no tests/core tests/physics
 
 # Zig's C compiler makes the kernels of all platforms here; it is needed for nothing else.
 $(VENV)/.zig: $(VENV)/.installed

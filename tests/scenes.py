@@ -34,7 +34,8 @@ def scene_of(parts, lights=(), world=(0.0, 0.0, 0.0)) -> Scene:
         base, first = sum(map(len, vertices)), sum(map(len, triangles))
         points = np.asarray(part.vertices, np.float64).reshape(-1, 3)
         own, polygons, corners = _fans(part.faces)
-        flat = np.cross(points[own[:, 1]] - points[own[:, 0]], points[own[:, 2]] - points[own[:, 0]])
+        with np.errstate(invalid="ignore"):  # corners may be infinite
+            flat = np.cross(points[own[:, 1]] - points[own[:, 0]], points[own[:, 2]] - points[own[:, 0]])
         flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
         normals.append(np.repeat(flat[:, None], 3, axis=1) if part.normals is None else part.normals[own])
         vertices.append(points)

@@ -13,8 +13,8 @@ ADDON = ROOT / "addon"
 MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "core": {"core"}}
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
-    *("settings", "scene", "textures", "emitters", "report", "workers", "kernel", "patches", "transport"),
-    *("exchange", "solver", "dense", "conjugate_gradient", "progressive", "stochastic"),
+    *("ranges", "settings", "scene", "sound_faces", "textures", "emitters", "report", "workers", "kernel", "patches"),
+    *("transport", "exchange", "solver", "dense", "conjugate_gradient", "progressive", "stochastic"),
     *("receivers", "texel_light", "guides", "radiosity"),
     *("charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing", "probes", "gather", "lightmap", "bake"),
 )

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..core.scene import Scene, SceneError, SceneObject
 from ..core.settings import BakeSettings, SettingsError
+from ..core.sound_faces import sound_faces
 from .cut_mesh import cut_mesh
-from .place_mesh import have_no_area
 from .read_scene import read_scene
 from .write_lightmap import require_layer_room, write_lightmap
 from .write_vertex_colours import write_vertex_colours
@@ -150,11 +150,11 @@ def _require_finite(what, values):
 
 
 def _require_complete(prepared, values, what):
-    """Every triangle of a target has its values; one without area may lack them, nobody sees it."""
+    """Every triangle of a target has its values; one that the bake left out may lack them, nobody sees it."""
+    kept = sound_faces(prepared.scene).kept
     for target in prepared.targets:
         is_missing = ~np.isfinite(values[target.span]).all(axis=(1, 2))
-        corners = prepared.scene.vertices[prepared.scene.triangles[target.span][is_missing]]
-        if not have_no_area(corners).all():
+        if (is_missing & kept[target.span]).any():
             raise SceneError(f"the bake has no {what} for some faces of '{target.name}': nothing has been written")
 
 

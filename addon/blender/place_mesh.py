@@ -25,7 +25,6 @@ class PlacedMesh:
     corners: np.ndarray
     lightmap_uvs: np.ndarray | None
     sharp_edges: np.ndarray
-    degenerate_count: int
 
     def mesh_arrays(self) -> dict:
         """The fields that a SceneObject shares."""
@@ -40,7 +39,7 @@ def place_mesh(mesh: MeshArrays, matrix: np.ndarray, materials: np.ndarray, uvs:
     order = [0, 2, 1] if is_mirrored else [0, 1, 2]
     vertices = mesh.positions @ linear.T + matrix[:3, 3]
     triangles = np.ascontiguousarray(mesh.triangles[:, order])
-    face_normals, is_degenerate = _face_normals(vertices[triangles])
+    face_normals = _face_normals(vertices[triangles])
     normals = mesh.corner_normals[:, order] @ _normal_matrix(linear).T
     lightmap_uvs = mesh.uvs.get(LIGHTMAP_LAYER)
     return PlacedMesh(
@@ -54,17 +53,11 @@ def place_mesh(mesh: MeshArrays, matrix: np.ndarray, materials: np.ndarray, uvs:
         lightmap_uvs=None if lightmap_uvs is None else np.ascontiguousarray(lightmap_uvs[:, order]),
         # Corners a, c, b: the edges are ac, cb, ba, which were numbers 2, 1, 0.
         sharp_edges=np.ascontiguousarray(mesh.sharp_edges[:, ::-1] if is_mirrored else mesh.sharp_edges),
-        degenerate_count=int(is_degenerate.sum()),
     )
 
 
-def have_no_area(corners) -> np.ndarray:
-    """Which triangles of corners (T, 3, 3) have no area to bake, bool (T,)."""
-    return _face_normals(corners)[1]
-
-
 def _face_normals(corners):
-    """Unit geometric normals (T, 3), +z where there is none, and which triangles have no area."""
+    """Unit geometric normals (T, 3), +z where there is none."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normals = np.cross(first, second)
     sides = np.stack([first, second, second - first])
@@ -73,7 +66,7 @@ def _face_normals(corners):
     is_degenerate = lengths <= DEGENERATE * longest_squared
     normals[is_degenerate] = (0.0, 0.0, 1.0)
     lengths[is_degenerate] = 1.0
-    return normals / lengths[:, None], is_degenerate
+    return normals / lengths[:, None]
 
 
 def _normal_matrix(linear):

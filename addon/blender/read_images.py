@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.scene import Texture
+from ..core.scene import BRIGHTEST, Texture
 from .shader_nodes import Unreadable
 
 # Bounced light does not see texels finer than this; an 8k texture would cost a gigabyte.
@@ -44,7 +44,7 @@ def linear_pixels(image, warn) -> np.ndarray:
             pixels = _linear_from_srgb_bytes(pixels)
             if space != "sRGB":
                 warn(f"image '{image.name}': colour space {space} is read as sRGB")
-    return _shrunk(np.nan_to_num(pixels, posinf=0.0, neginf=0.0))
+    return _shrunk(np.clip(np.nan_to_num(pixels, posinf=0.0), 0.0, BRIGHTEST))
 
 
 def mean_colour(pixels) -> tuple[float, float, float]:

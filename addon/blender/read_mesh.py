@@ -7,9 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 LIGHTMAP_LAYER = "Lightmap"
-
-# Blender stores an infinite coordinate as the largest float; a ray squares distances, in float32.
-FARTHEST = 1e15
+INFINITE = 1e15  # Blender stores an infinite coordinate as the largest float
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +74,7 @@ def read_positions(mesh) -> np.ndarray:
 
 def are_finite(positions) -> bool:
     """Whether rays can be traced to these positions."""
-    return bool((np.abs(positions) < FARTHEST).all())
+    return bool((np.abs(positions) < INFINITE).all())
 
 
 def corner_vertices(mesh) -> np.ndarray:

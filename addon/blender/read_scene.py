@@ -141,9 +141,6 @@ class SceneReading:
             return
         materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
         placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
-        if placed.degenerate_count:
-            noun = "triangle" if placed.degenerate_count == 1 else "triangles"
-            self.warn(f"'{name}' has {placed.degenerate_count} {noun} without area")
         self.placed.append(placed)
         self.names.append(name)
         self.is_target.append(target)

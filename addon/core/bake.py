@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,12 +11,13 @@ from .gather import Irradiance, gather_irradiance
 from .kernel import KernelScene
 from .lightmap import Lightmap, assemble
 from .probes import seen_through_corners, seen_through_lightmap
-from .radiosity import Solved, solve_radiosity
+from .radiosity import UNSHOT_LIMIT, Solved, solve_radiosity
 from .receivers import surface_receivers, vertex_receivers
 from .report import Report
 from .scene import Scene, SceneError, radiance_from_exitance
 from .settings import BakeSettings
 from .smoothing import texel_grid
+from .sound_faces import SoundFaces, sound_faces
 from .texels import texels
 from .unwrap import unwrap
 from .workers import OnProgress, Progress, Workers
@@ -32,7 +33,8 @@ class BakeResult:
     Attributes
     ----------
     lightmap : pixels of E / pi and where every triangle lies in them
-    corner_colours : float32 (T, 3, 3) E / pi per triangle corner, NaN on triangles of objects that are not targets
+    corner_colours : float32 (T, 3, 3) E / pi per triangle corner, NaN on triangles of objects that are not targets and
+        of polygons that were left out whole
     report : seconds, rays, error, energy, warnings
     """
 
@@ -46,8 +48,9 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
 
     Raises SceneError or SettingsError for what cannot be baked, BakeCancelled when ``on_progress`` returns False.
     """
-    if not any(obj.is_target and obj.count for obj in scene.objects):
-        raise SceneError("nothing to bake: the scene has no target object with faces")
+    sound = sound_faces(scene)
+    _require_targets(sound)
+    scene = sound.scene
     progress = Progress(on_progress, STAGE_SHARES)
     with Workers(settings.thread_count) as workers:
         if settings.target == "lightmap":
@@ -79,13 +82,24 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
         lightmap = corner_colours = None
         if settings.target == "lightmap":
             lightmap = assemble(irradiance.values, texel_map, charts)
+            lightmap = replace(lightmap, uvs=sound.spread(lightmap.uvs))
         else:
             corner_colours = np.full((len(scene.triangles), 3, 3), np.nan, np.float32)
             colours = radiance_from_exitance(corner_means.corner_values(irradiance.values))
             corner_colours[corner_means.triangles] = colours
+            corner_colours = sound.spread(corner_colours)
         progress.end()
     report = _report(scene, settings, progress, solved, irradiance, lightmap)
     return BakeResult(lightmap, corner_colours, report)
+
+
+def _require_targets(sound: SoundFaces) -> None:
+    if any(obj.is_target and obj.count for obj in sound.scene.objects):
+        return
+    if any(obj.is_target and obj.count for obj in sound.whole.objects):
+        reasons = "; ".join(sound.scene.warnings[len(sound.whole.warnings) :][:1])
+        raise SceneError(f"nothing to bake: no face of the target objects can be: {reasons}")
+    raise SceneError("nothing to bake: the scene has no target object with faces")
 
 
 def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap) -> Report:
@@ -94,6 +108,11 @@ def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, l
         warnings.append(
             f"the target error {settings.error:g} was not reached: sampling stopped at an estimated "
             f"{irradiance.relative_error:.3g}" + (" by the time limit" if settings.time_limit else "")
+        )
+    energy = solved.solution.energy
+    if solved.solution.solver != "direct" and energy.unshot > 2 * UNSHOT_LIMIT * energy.shot:
+        warnings.append(
+            f"the solver stopped with {energy.unshot / energy.shot:.2g} of the light unshot: too little is absorbed"
         )
     return Report(
         seconds=progress.seconds,
@@ -110,6 +129,6 @@ def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, l
         seen_error=irradiance.seen_error,
         target_error=settings.error,
         target_reached=irradiance.target_reached,
-        energy=solved.solution.energy,
+        energy=energy,
         warnings=tuple(warnings),
     )

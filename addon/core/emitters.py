@@ -103,8 +103,16 @@ def _glowing_triangles(scene):
     corners = np.concatenate([corners, pieces])
     radiances = np.concatenate([factors[scene.triangle_materials[plain]], glow])
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    keep = (areas > 0) & (radiances.max(axis=1, initial=0.0) > 0)
+    keep = (areas > 0) & (radiances.max(axis=1, initial=0.0) > 0) & _is_first(corners)
     return corners[keep], radiances[keep]
+
+
+def _is_first(corners):
+    """False for triangles (N, 3, 3) that lie where an earlier one does: one hides the other: they must not add up."""
+    ordered = np.take_along_axis(corners, np.lexsort(np.moveaxis(corners, 2, 0), axis=1)[..., None], axis=1)
+    is_first = np.zeros(len(corners), bool)
+    is_first[np.unique(ordered.reshape(-1, 9), axis=0, return_index=True)[1]] = True
+    return is_first
 
 
 def _cuts(n):

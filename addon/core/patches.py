@@ -12,10 +12,12 @@ import numpy as np
 
 from .kernel import KernelScene
 from .scene import Scene
+from .settings import SettingsError
 from .textures import textured_colours
 
 TEXTURE_SAMPLES = 8  # points a patch on which its texture is averaged
 LARGEST_SHARE = 1 / 8  # of all patches that one triangle may take
+MOST_PATCHES = 4_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +76,11 @@ def patch_size_for(scene: Scene, budget: int) -> float:
 def subdivide(scene: Scene, kernel: KernelScene, size: float, budget: int, seed: int) -> Patches:
     """Cut every triangle into patches of at most about ``size`` [m] and tell the kernel of them."""
     areas = triangle_areas(scene)
-    # a triangle that would take more than its share gets larger patches
-    sizes = np.maximum(size, np.sqrt(areas / (budget * LARGEST_SHARE)))
     apexes, longest = _apexes(scene)
+    # a triangle that would take more than its share gets larger patches; a sliver takes them along its length
+    share = budget * LARGEST_SHARE
+    sizes = np.maximum(size, np.maximum(np.sqrt(areas / share), longest / share))
+    _require_few(size, areas / sizes**2, len(areas))
     rows = np.maximum(1, np.ceil(2 * areas / np.maximum(longest * sizes, 1e-300) - 1e-6)).astype(np.int64)
     first_rows = _offsets(rows)
 
@@ -104,6 +108,13 @@ def subdivide(scene: Scene, kernel: KernelScene, size: float, budget: int, seed:
         bounds=bounds.astype(np.float32),
         apexes=apexes,
     )
+
+
+def _require_few(size, pieces, triangle_count):
+    """Refuse what no memory holds: a patch costs about a kilobyte while its light is measured."""
+    count = float(pieces.sum())
+    if count > max(MOST_PATCHES, 2 * triangle_count):
+        raise SettingsError(f"patch_size is {size:g}: the scene would have {count:.3g} patches, at most {MOST_PATCHES}")
 
 
 def patch_triangles(scene: Scene, patches: Patches, chosen):

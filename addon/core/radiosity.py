@@ -33,6 +33,7 @@ PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 
 PATCH_SKY_RAYS = 4  # of each point
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it
+MOST_REFLECTANCE = 0.9999  # while light is solved for: in a closed room that absorbs nothing it has no bound
 MIXED = 0.5  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
 LEAK = 0.02  # the same where part of the side is in shadow: what a wall keeps out must not come in along the floor
 SHADOW = 0.25  # of the brightest point of a side: darker ones are in shadow
@@ -177,7 +178,7 @@ def _as_sources(scene, kernel, patches, emitters, radiosity, bright):
 
 
 def _solve(kernel, patches, emitted, solver, method, settings, on_step) -> Solution:
-    areas, reflectance = patches.side_areas, patches.side_reflectance
+    areas, reflectance = patches.side_areas, np.minimum(patches.side_reflectance, MOST_REFLECTANCE)
     if solver == "stochastic":
         rays = int(min(max(8 * len(emitted), 1 << 20) * (0.05 / settings.error), 1 << 25))
         return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, settings.seed, on_step)

@@ -9,6 +9,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .ranges import (
+    BRIGHTEST,
+    LARGEST_COORDINATE,
+    SceneError,
+    require_colour,
+    require_direction,
+    require_number,
+    require_pixels,
+    require_vector,
+)
+
 # pi stands in these two functions and nowhere else in the package's Python: a Lambertian surface of
 # radiance L sends out M = pi L [W/m^2].
 
@@ -23,10 +34,6 @@ def radiance_from_exitance(exitance):
     return np.asarray(exitance) / np.pi
 
 
-class SceneError(ValueError):
-    """A scene that cannot be baked; the message names the object, material or array."""
-
-
 @dataclass(frozen=True, slots=True)
 class Texture:
     """An image looked up bilinearly at UVs that repeat; row 0 is v = 0.
@@ -39,6 +46,9 @@ class Texture:
 
     name: str
     pixels: np.ndarray
+
+    def __post_init__(self):
+        require_pixels(f"image {self.name}", self.pixels)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +71,12 @@ class Material:
     radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     radiance_texture: Texture | None = None
     transmittance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self):
+        owner = f"material {self.name}"
+        require_colour(owner, "reflectance", self.reflectance, 1.0)
+        require_colour(owner, "radiance", self.radiance, BRIGHTEST)
+        require_colour(owner, "transmittance", self.transmittance, 1.0)
 
     @property
     def transmits(self) -> bool:
@@ -88,6 +104,14 @@ class PointLight:
     direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
     cone_cosines: tuple[float, float] = (-2.0, -2.0)
 
+    def __post_init__(self):
+        owner = f"light {self.name}"
+        require_vector(owner, "position", self.position)
+        require_colour(owner, "intensity", self.intensity, BRIGHTEST)
+        require_number(owner, "radius", self.radius, 0.0, LARGEST_COORDINATE)
+        require_direction(owner, "direction", self.direction)
+        require_vector(owner, "cone_cosines", self.cone_cosines, 2.0, count=2)
+
 
 @dataclass(frozen=True, slots=True)
 class AreaLight:
@@ -105,6 +129,13 @@ class AreaLight:
     is_ellipse: bool = False
     spread: float = 3.141592653589793  # full angle [rad]
 
+    def __post_init__(self):
+        owner = f"light {self.name}"
+        for name in ("centre", "axis_u", "axis_v"):
+            require_vector(owner, name, getattr(self, name))
+        require_colour(owner, "radiance", self.radiance, BRIGHTEST)
+        require_number(owner, "spread", self.spread, 0.0, 3.2)
+
 
 @dataclass(frozen=True, slots=True)
 class SunLight:
@@ -114,6 +145,12 @@ class SunLight:
     direction: tuple[float, float, float]  # where the light travels to, unit
     irradiance: tuple[float, float, float]  # [W/m^2]
     angle: float = 0.0  # [rad]
+
+    def __post_init__(self):
+        owner = f"light {self.name}"
+        require_direction(owner, "direction", self.direction)
+        require_colour(owner, "irradiance", self.irradiance, BRIGHTEST)
+        require_number(owner, "angle", self.angle, 0.0, 3.2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +179,15 @@ class SceneObject:
     lightmap_uvs: np.ndarray | None = None
     sharp_edges: np.ndarray | None = None
 
+    def __post_init__(self):
+        if self.count < 0:
+            raise SceneError(f"object {self.name} has {self.count} triangles")
+        shapes = {"polygons": (), "corners": (3,), "lightmap_uvs": (3, 2), "sharp_edges": (3,)}
+        for name, shape in shapes.items():
+            array, expected = getattr(self, name), (self.count, *shape)
+            if array is not None and np.shape(array) != expected:
+                raise SceneError(f"object {self.name}: {name}: expected {expected}, got {np.shape(array)}")
+
     @property
     def span(self) -> slice:
         return slice(self.first, self.first + self.count)
@@ -150,6 +196,9 @@ class SceneObject:
 @dataclass(frozen=True, slots=True)
 class Scene:
     """Triangles, materials and lights, in world space.
+
+    Single numbers of ``vertices``, ``corner_normals`` and ``uvs`` may be anything, NaN included: what no ray can meet
+    is left out of a bake with a warning (sound_faces.py).
 
     Attributes
     ----------
@@ -185,8 +234,7 @@ class Scene:
         _require_rows("triangle_materials", self.triangle_materials, np.int32, (triangle_count,))
         _require_index("triangles", self.triangles, "vertex", len(self.vertices))
         _require_index("triangle_materials", self.triangle_materials, "material", len(self.materials))
-        _require_finite("vertices", self.vertices)
-        _require_finite("corner_normals", self.corner_normals)
+        require_colour("the world", "radiance", self.world_radiance, BRIGHTEST)
         expected = 0
         for obj in self.objects:
             if obj.first != expected:
@@ -212,9 +260,3 @@ def _require_index(name, indices, noun, count):
     if bad.any():
         row = int(np.argwhere(bad)[0][0])
         raise SceneError(f"{name}[{row}] names a {noun} outside 0..{count - 1}")
-
-
-def _require_finite(name, array):
-    bad = ~np.isfinite(array).reshape(len(array), -1).all(axis=1)
-    if bad.any():
-        raise SceneError(f"{name}[{int(np.argmax(bad))}] is not finite")

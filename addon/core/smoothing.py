@@ -19,6 +19,7 @@ from .texels import TexelMap
 from .textures import textured_colours
 from .workers import Workers
 
+LARGEST_VARIANCE = 1e34  # whatever shines: the sum of some remains a float32
 STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
 
 
@@ -55,7 +56,8 @@ def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Rec
 def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means):
     """Replicate means (N, R, 3) of gathered light, smoothed: values float32 (N, 3), variance of luminance (N,)."""
     values = means.mean(axis=1, dtype=np.float32)
-    variances = ((means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]).astype(np.float32)
+    variances = (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]
+    variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
     # a few replicates alone say little of one texel's noise: pool them over the neighbours
     pooled, _ = smooth(workers, grid, receivers, np.repeat(variances[:, None], 3, axis=1), variances, 1, False)
     noise = np.ascontiguousarray(pooled[:, 0])

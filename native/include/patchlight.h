@@ -17,6 +17,7 @@
 #ifndef PATCHLIGHT_H
 #define PATCHLIGHT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -24,7 +25,7 @@ typedef enum pl_status {
     PL_OK = 0,
     PL_CANCELLED = 1,
     PL_ERR_MEMORY = -1,
-    PL_ERR_ARGUMENT = -2, /* an index out of range, a count of 0 where one is needed */
+    PL_ERR_ARGUMENT = -2, /* an index or number out of range, a count of 0 where one is needed */
     PL_ERR_EMBREE = -3    /* the library cannot be opened, or is not the one that was measured */
 } pl_status;
 
@@ -47,13 +48,15 @@ void pl_embree_close(pl_embree *embree);
  * A BVH over triangles, both sides visible.
  *
  *   embree         must outlive the scene
- *   vertices       3 * vertex_count doubles; re-centred in double before they become float
+ *   vertices       3 * vertex_count doubles; re-centred in double before they become float. PL_ERR_ARGUMENT where one
+ *                  is not a number or beyond +-PL_LARGEST_COORDINATE [m]
  *   triangles      3 * triangle_count indices
  *   transmittance  3 * triangle_count floats: the share of light that passes straight through; a
  *                  triangle with any above 0 occludes nothing and tints what passes. NULL = all opaque
  *
  * Triangles without an area are kept, so that indices stay, and never hit.
  */
+#define PL_LARGEST_COORDINATE 1e8
 typedef struct pl_scene pl_scene;
 pl_status pl_scene_create(const pl_embree *embree, const double *vertices, size_t vertex_count,
                           const int32_t *triangles, size_t triangle_count, const float *transmittance,
@@ -89,6 +92,8 @@ pl_status pl_patches_create(const uint8_t *apexes, const int32_t *first_rows, si
                             const int32_t *first_patches, size_t row_count, pl_patches **out_patches);
 void pl_patches_destroy(pl_patches *patches);
 size_t pl_patches_count(const pl_patches *patches);
+/* Whether the patches have the scene's number of triangles: whoever takes both relies on it. */
+bool pl_patches_fit(const pl_patches *patches, const pl_scene *scene);
 
 /*
  * Points spread evenly over patches, randomised quasi-Monte Carlo.
@@ -219,9 +224,10 @@ typedef struct pl_solution {
 /*
  * The light on a lightmap's own texels, once it is about known: finer than any patch.
  *
- *   uvs        6 per triangle of the scene: corners in texels, as in pl_rasterise_texels; NaN without a place
+ *   uvs        6 * triangle_count, which is the scene's: corners in texels, as in pl_rasterise_texels; NaN without a
+ *              place
  *   receivers  width * height: which receiver each texel is, -1 for none
- *   radiosity  3 per receiver: reflected radiosity
+ *   radiosity  3 * receiver_count: reflected radiosity
  *   reach      rays that hit from nearer [m] do not take a texel's light, which may lie half under something, but go on
  */
 typedef struct pl_texel_light {
@@ -229,6 +235,7 @@ typedef struct pl_texel_light {
     const int32_t *receivers;
     int32_t width, height;
     const float *radiosity;
+    size_t triangle_count, receiver_count;
     float reach;
 } pl_texel_light;
 
@@ -325,15 +332,16 @@ pl_status pl_rasterise_texels(const float *uvs, size_t triangle_count, int32_t w
  *   uvs              6 * triangle_count: corners in a frame of the chart's own, not negative, from (0, 0)
  *   first_triangles  chart_count + 1: chart c has triangles first_triangles[c] .. first_triangles[c + 1] - 1
  *   density          texels per unit of uvs
- *   width            of the atlas [texels]
+ *   width            of the atlas [texels], at most PL_WIDEST_ATLAS
  *   block            charts are placed in steps of so many texels; 1 packs best, more is faster in a large atlas
  *   out_places       3 * chart_count: column and row of the chart's first block, and whether it is turned (u and v
  *                    swapped). A corner stands at block * (column, row) + PL_CHART_START + density * (u, v)
  *   out_height       rows used [texels]
  *
- * PL_ERR_ARGUMENT also where a chart is wider and higher than the atlas is wide.
+ * PL_ERR_ARGUMENT also where a corner is negative or no number, or a chart wider and higher than the atlas is wide.
  */
 #define PL_CHART_START 0.504
+#define PL_WIDEST_ATLAS (1 << 28)
 pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t *first_triangles, size_t chart_count,
                          double density, int32_t width, int32_t block, int32_t *out_places, int32_t *out_height);
 

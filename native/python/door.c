@@ -77,6 +77,23 @@ bool door_has_numbers(const door_array *array, size_t count) {
     return found == count;
 }
 
+const pl_patches *door_patches(const pl_scene *scene, PyObject *capsule) {
+    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsule, PATCHES) : NULL;
+    if (patches && !pl_patches_fit(patches, scene)) {
+        PyErr_SetString(PyExc_ValueError, "patches: cut from another number of triangles than the scene has");
+        return NULL;
+    }
+    return patches;
+}
+
+bool door_range_fits(uint64_t first, uint64_t count, uint64_t end) {
+    const bool fits = first <= end && count <= end - first;
+    if (!fits)
+        PyErr_Format(PyExc_ValueError, "first, count: %zu and %zu leave 0 .. %zu", (size_t)first, (size_t)count,
+                     (size_t)end);
+    return fits;
+}
+
 PyObject *door_result(pl_status status) {
     switch (status) {
     case PL_OK:

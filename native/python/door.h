@@ -39,6 +39,12 @@ static inline size_t door_rows(const door_array *array) {
 /* Whether an array holds so many numbers; an exception names it where not. */
 bool door_has_numbers(const door_array *array, size_t count);
 
+/* Patches that were cut from this scene's triangles; NULL with an exception where they were not. */
+const pl_patches *door_patches(const pl_scene *scene, PyObject *capsule);
+
+/* Whether first .. first + count - 1 are within `end`; an exception where not. */
+bool door_range_fits(uint64_t first, uint64_t count, uint64_t end);
+
 /* NULL with the exception that the status means; None for PL_OK. */
 PyObject *door_result(pl_status status);
 

@@ -64,7 +64,8 @@ static pl_solution solution_of(const door_array *arrays) {
 /* `width` 0: no texel has a light of its own yet. */
 static pl_texel_light texels_of(const door_array *arrays, int32_t width, float reach) {
     const int32_t height = width > 0 ? (int32_t)(door_rows(&arrays[1]) / (size_t)width) : 0;
-    return (pl_texel_light){arrays[0].view.buf, arrays[1].view.buf, width, height, arrays[2].view.buf, reach};
+    return (pl_texel_light){arrays[0].view.buf,    arrays[1].view.buf,    width, height, arrays[2].view.buf,
+                            door_rows(&arrays[0]), door_rows(&arrays[2]), reach};
 }
 
 /* The tuples (solution, lights, receivers) into objects[0 .. GATHER_ARRAY_COUNT); false with an exception. */
@@ -89,7 +90,7 @@ PyObject *door_gather(PyObject *self, PyObject *args) {
                           &objects[SUMS]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = door_patches(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {GATHER_ARRAYS(sides),
                            {"guide_groups", 'i', 1, AS_MANY_ROWS_AS(RECEIVERS_AT), false, {0}},
@@ -134,7 +135,7 @@ PyObject *door_learn_guides(PyObject *self, PyObject *args) {
                           &objects[MEMBERS], &objects[FIRST_MEMBERS], &first, &count, &rays, &seed, &objects[MOMENTS]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = door_patches(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {GATHER_ARRAYS(sides),
                            {"members", 'I', 1, -1, false, {0}},
@@ -147,8 +148,11 @@ PyObject *door_learn_guides(PyObject *self, PyObject *args) {
     const pl_receivers receivers = receivers_of(arrays + RECEIVERS_AT);
     const pl_texel_light texels = texels_of(arrays + TEXELS_AT, width, reach);
     const pl_gather_scene in = {scene, patches, &solution, width > 0 ? &texels : NULL, &lights};
-    const bool fits = first >= 0 && count >= 0 && (size_t)(first + count) <= door_rows(&arrays[MOMENTS]) &&
-                      (size_t)(first + count) < door_rows(&arrays[FIRST_MEMBERS]);
+    const uint32_t *starts = arrays[FIRST_MEMBERS].view.buf;
+    bool fits = first >= 0 && count >= 0 && (size_t)(first + count) <= door_rows(&arrays[MOMENTS]) &&
+                (size_t)(first + count) < door_rows(&arrays[FIRST_MEMBERS]);
+    for (Py_ssize_t group = first; fits && group < first + count; ++group)
+        fits = starts[group] <= starts[group + 1] && starts[group + 1] <= door_rows(&arrays[MEMBERS]);
 
     Py_BEGIN_ALLOW_THREADS
     if (fits)
@@ -191,6 +195,26 @@ PyObject *door_direct(PyObject *self, PyObject *args) {
     return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
 }
 
+/* Whether no index is `end` or more; below 0 is none. An exception names the array where one is. */
+static bool indices_are_below(const int32_t *indices, size_t count, size_t end, const char *name) {
+    for (size_t i = 0; i < count; ++i) {
+        if (indices[i] >= 0 && (size_t)indices[i] >= end) {
+            PyErr_Format(PyExc_ValueError, "%s: %d is not below %zu", name, (int)indices[i], end);
+            return false;
+        }
+    }
+    return true;
+}
+
+static Py_ssize_t grid_size(const pl_texel_grid *grid) {
+    return grid->width > 0 && grid->height > 0 ? (Py_ssize_t)grid->width * grid->height : 0;
+}
+
+static bool grid_is_valid(const pl_texel_grid *grid, size_t receivers) {
+    return grid->width >= 0 && grid->height >= 0 &&
+           indices_are_below(grid->receivers, (size_t)grid_size(grid), receivers, "grid");
+}
+
 PyObject *door_smooth(PyObject *self, PyObject *args) {
     enum { VALUES = RECEIVER_ARRAY_COUNT + 1, VARIANCES, OUT_VALUES, OUT_VARIANCES, ARRAYS };
     PyObject *receiver_arrays, *objects[ARRAYS];
@@ -202,7 +226,7 @@ PyObject *door_smooth(PyObject *self, PyObject *args) {
                           &stops_on_value, &first_row, &row_count, &objects[OUT_VALUES], &objects[OUT_VARIANCES]))
         return NULL;
     door_array arrays[] = {RECEIVER_ARRAYS(0),
-                           {"grid", 'i', 1, (Py_ssize_t)grid.width * grid.height, false, {0}},
+                           {"grid", 'i', 1, grid_size(&grid), false, {0}},
                            {"values", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
                            {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
                            {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}},
@@ -211,6 +235,13 @@ PyObject *door_smooth(PyObject *self, PyObject *args) {
         return NULL;
     const pl_receivers receivers = receivers_of(arrays);
     grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
+    if (!grid_is_valid(&grid, receivers.count) ||
+        !door_range_fits((size_t)first_row, (size_t)row_count, (size_t)grid.height)) {
+        if (!PyErr_Occurred())
+            PyErr_SetString(PyExc_ValueError, "grid: its size is none");
+        door_release(arrays, ARRAYS);
+        return NULL;
+    }
 
     Py_BEGIN_ALLOW_THREADS
     pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value, first_row,

@@ -162,7 +162,7 @@ static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
     if (!PyArg_ParseTuple(args, "OOOIIO", &capsules[0], &capsules[1], &objects[0], &rays, &seed, &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = door_patches(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
@@ -190,7 +190,7 @@ static PyObject *form_factors_hemicube(PyObject *self, PyObject *args) {
                           &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = door_patches(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
@@ -218,10 +218,10 @@ static PyObject *openness(PyObject *self, PyObject *args) {
                           &objects[1]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = door_patches(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"reaches", 'f', 1, sides, false, {0}}, {"out_openness", 'f', 1, sides, true, {0}}};
-    if (!patches || !door_arrays(objects, arrays, 2))
+    if (!patches || !door_range_fits((size_t)first, (size_t)count, (size_t)sides) || !door_arrays(objects, arrays, 2))
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
@@ -230,6 +230,16 @@ static PyObject *openness(PyObject *self, PyObject *args) {
 
     door_release(arrays, 2);
     Py_RETURN_NONE;
+}
+
+/* Whether the sides' runs of rays rise from 0 and hold the range asked for; an exception where not. */
+static bool rays_are_owned(const uint64_t *first_rays, size_t sides, uint64_t first, uint64_t count) {
+    bool rises = first_rays[0] == 0;
+    for (size_t side = 0; side < sides; ++side)
+        rises &= first_rays[side] <= first_rays[side + 1];
+    if (!rises)
+        PyErr_SetString(PyExc_ValueError, "first_rays: expected numbers that rise from 0");
+    return rises && door_range_fits(first, count, first_rays[sides]);
 }
 
 static PyObject *shoot(PyObject *self, PyObject *args) {
@@ -241,7 +251,7 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
                           &count, &seed, &objects[3], &objects[4]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
-    const pl_patches *patches = scene ? PyCapsule_GetPointer(capsules[1], PATCHES) : NULL;
+    const pl_patches *patches = door_patches(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
     door_array arrays[] = {{"first_rays", 'Q', 1, sides + 1, false, {0}},
                            {"first_samples", 'I', 1, sides, false, {0}},
@@ -250,6 +260,10 @@ static PyObject *shoot(PyObject *self, PyObject *args) {
                            {"io_escaped", 'Q', 3, 1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 5))
         return NULL;
+    if (!rays_are_owned(arrays[0].view.buf, (size_t)sides, first, count)) {
+        door_release(arrays, 5);
+        return NULL;
+    }
 
     Py_BEGIN_ALLOW_THREADS
     pl_shoot(scene, patches, arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf, first, count, seed,

@@ -70,7 +70,7 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
     if (!is_occluded(scene, origin, sample.direction, sample.far)) {
         transmit(scene, origin, sample.direction, sample.far, sample.irradiance);
         for (int c = 0; c < 3; ++c)
-            out_rgb[c] = sample.irradiance[c] * total / importances[chosen];
+            out_rgb[c] = bounded(sample.irradiance[c] * (total / importances[chosen]));
     }
     return true;
 }
@@ -128,7 +128,7 @@ static void estimate(const direct_job *job, const pl_receiver_frame *frame, size
     for (int c = 0; c < 3; ++c) {
         out_rgb[c] = 0;
         if (is_exact && sums->all[c] > 0)
-            out_rgb[c] = exact[c] * sums->seen[c] / sums->all[c];
+            out_rgb[c] = exact[c] * (sums->seen[c] / sums->all[c]);
         else if (!is_exact && sums->taken)
             out_rgb[c] = sums->seen[c] / (float)sums->taken;
     }
@@ -183,7 +183,7 @@ static void add_weak_lights(direct_job *job, const pl_receiver_frame *frame, flo
                 !shine(job, frame, &sample))
                 continue;
             for (int c = 0; c < 3; ++c)
-                out_rgb[c] += sample.irradiance[c] * step / importance;
+                out_rgb[c] += bounded(sample.irradiance[c] * (step / importance));
         }
     }
 }
@@ -214,10 +214,10 @@ static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint
             add_weak_lights(job, frame, threshold, weak, each, hash_pair(seed, 0x80000000u + r), totals[r]);
     }
     for (int c = 0; c < 3; ++c)
-        out_rgb[c] = 0.5f * (totals[0][c] + totals[1][c]);
+        out_rgb[c] = bounded(0.5f * (totals[0][c] + totals[1][c]));
     /* of a mean of two */
     const float difference = luminance(totals[0]) - luminance(totals[1]);
-    *out_variance = 0.25f * difference * difference;
+    *out_variance = fminf(0.25f * difference * difference, most_light * most_light);
 }
 
 pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers, size_t first,
@@ -226,6 +226,8 @@ pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_rec
     for (size_t i = first; i < first + count; ++i)
         if (!receiver_is_valid(scene, receivers, i))
             return PL_ERR_ARGUMENT;
+    if (!lights_are_valid(lights))
+        return PL_ERR_ARGUMENT;
     direct_job job = {.scene = scene, .lights = lights, .samples = samples ? samples : 1, .seed = seed};
     job.importances = malloc(sizeof(float) * (lights->count + 1));
     if (!job.importances || !light_balls_create(lights, &job.balls)) {

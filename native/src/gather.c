@@ -80,7 +80,7 @@ static const float *texel_hit(const pl_texel_light *texels, const pl_hit *hit) {
     if (!(u >= 0 && v >= 0 && u < (float)texels->width && v < (float)texels->height))
         return NULL;
     const int32_t receiver = texels->receivers[(size_t)v * (size_t)texels->width + (size_t)u];
-    return receiver < 0 ? NULL : texels->radiosity + 3 * (size_t)receiver;
+    return receiver < 0 || (size_t)receiver >= texels->receiver_count ? NULL : texels->radiosity + 3 * (size_t)receiver;
 }
 
 static bool is_far(const gather_job *job, const pl_hit *hit, size_t side) {
@@ -149,6 +149,10 @@ static pl_status begin(gather_job *job, const pl_gather_scene *in, const pl_rece
     for (size_t i = 0; i < count; ++i)
         if (!receiver_is_valid(in->scene, receivers, selected[i]))
             return PL_ERR_ARGUMENT;
+    if (in->texels && in->texels->triangle_count != in->scene->triangle_count)
+        return PL_ERR_ARGUMENT;
+    if (!lights_are_valid(in->lights) || !pl_patches_fit(in->patches, in->scene))
+        return PL_ERR_ARGUMENT;
     *job = (gather_job){.scene = in->scene,
                         .patches = in->patches,
                         .solution = in->solution,
@@ -167,12 +171,23 @@ static void end(gather_job *job) {
     free(job->importances);
 }
 
+static bool guides_fit(const pl_guides *guides, const uint32_t *selected, size_t count) {
+    for (size_t i = 0; i < count; ++i)
+        if (guides->groups[selected[i]] >= 0 && (size_t)guides->groups[selected[i]] >= guides->group_count)
+            return false;
+    return true;
+}
+
 pl_status pl_gather(const pl_gather_scene *in, const pl_receivers *receivers, const pl_guides *guides,
                     const uint32_t *selected, size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
     gather_job job;
     const pl_status status = begin(&job, in, receivers, selected, count);
     if (status != PL_OK)
         return status;
+    if (!guides_fit(guides, selected, count)) {
+        end(&job);
+        return PL_ERR_ARGUMENT;
+    }
     for (size_t i = 0; i < count; ++i) {
         const pl_receiver_frame frame = receiver_frame(in->scene, receivers, selected[i]);
         const guide by = guide_of(guides, selected[i]);

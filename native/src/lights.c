@@ -38,6 +38,12 @@ static area_light area_of(const float *p) {
 
 static mesh_light mesh_of(const float *p) { return (mesh_light){vec3_from(p), p[3], p[4], (size_t)p[5], (size_t)p[6]}; }
 
+/* How far along itself a shadow ray goes to a lamp that may lie in a face. */
+static const float far_of_face = 0.999999f;
+
+/* Eight units in the last place of a point's largest coordinate, as in point_off_triangle. */
+static float rounding_of(vec3 p) { return 9.5367431640625e-7f * fmaxf(fabsf(p.x), fmaxf(fabsf(p.y), fabsf(p.z))); }
+
 static const float *parameters_of(const pl_lights *lights, size_t light) {
     return lights->parameters + PL_LIGHT_FLOATS * light;
 }
@@ -68,9 +74,9 @@ static float cone_importance(const point_light *light, vec3 point) {
     return fmaxf(share, light->radius > 0 ? 0.01f : 0);
 }
 
-/* A uniform direction in the cone that a sphere fills, or a point of the disc that faces the receiver. */
+/* A uniform direction in the cone that a sphere fills; its solid angle over the area of a disc of its radius. */
 static bool sample_sphere(const point_light *light, vec3 to, float distance, float x, float y, vec3 *out_direction,
-                          float *out_far, float *out_solid_angle) {
+                          float *out_far, float *out_over_disc) {
     vec3 u, v;
     const vec3 axis = vec3_scale(to, 1 / distance);
     const float sine = light->radius / distance;
@@ -86,7 +92,7 @@ static bool sample_sphere(const point_light *light, vec3 to, float distance, flo
     const vec3 across = vec3_mul_add(u, side * cosf(angle), vec3_scale(v, side * sinf(angle)));
     *out_direction = vec3_mul_add(axis, cosine, across);
     *out_far = distance * cosine - sqrtf(fmaxf(0, light->radius * light->radius - distance * distance * side * side));
-    *out_solid_angle = 2 * PL_PI * one_minus_cos_max;
+    *out_over_disc = 2 / (distance * distance * (1 + sqrtf(1 - sine * sine)));
     return true;
 }
 
@@ -100,7 +106,7 @@ static bool sample_point_light(const float *p, vec3 point, vec3 normal, float x,
 
     if (light.radius <= 0) {
         out->direction = to;
-        out->far = 1;
+        out->far = far_of_face;
         const float cosine = vec3_dot(to, normal) / distance;
         factor = cosine * cone_share(&light, vec3_scale(to, -1 / distance)) / (distance * distance);
     } else if (light.is_soft > 0) {
@@ -117,12 +123,11 @@ static bool sample_point_light(const float *p, vec3 point, vec3 normal, float x,
         factor = cosine * (distance / reach) / square;
         factor *= cone_share(&light, vec3_scale(out->direction, -1 / reach));
     } else {
-        /* a sphere of radiance P / (4 pi^2 r^2) = I / (pi r^2) */
-        float solid_angle;
-        if (!sample_sphere(&light, to, distance, x, y, &out->direction, &out->far, &solid_angle))
+        /* a sphere of radiance P / (4 pi^2 r^2) = I / (pi r^2), times its solid angle: r^2 cancels, however small */
+        float over_disc;
+        if (!sample_sphere(&light, to, distance, x, y, &out->direction, &out->far, &over_disc))
             return false;
-        const float cosine = vec3_dot(out->direction, normal);
-        factor = cosine * solid_angle / (PL_PI * light.radius * light.radius);
+        factor = vec3_dot(out->direction, normal) * over_disc;
         factor *= cone_share(&light, vec3_scale(out->direction, -1));
     }
     scaled(p + 3, factor, out->irradiance);
@@ -198,12 +203,13 @@ static bool sample_area(const float *p, vec3 point, vec3 normal, float x, float 
         a = radius * cosf(angle);
         b = radius * sinf(angle);
     }
+    /* off the lamp's plane, in which a ceiling may lie that must not be in the way */
+    const vec3 lamp_normal = vec3_unit(vec3_cross(light.axis_u, light.axis_v));
     const vec3 target = vec3_mul_add(light.axis_u, a, vec3_mul_add(light.axis_v, b, light.centre));
-    out->direction = vec3_sub(target, point);
-    out->far = 1;
+    out->direction = vec3_sub(vec3_mul_add(lamp_normal, rounding_of(target), target), point);
+    out->far = far_of_face;
     const float square = vec3_dot(out->direction, out->direction);
     const float reach = sqrtf(square);
-    const vec3 lamp_normal = vec3_unit(vec3_cross(light.axis_u, light.axis_v));
     const float lamp_cosine = -vec3_dot(out->direction, lamp_normal) / fmaxf(reach, 1e-30f);
     const float cosine = vec3_dot(out->direction, normal) / fmaxf(reach, 1e-30f);
     if (cosine <= 0 || lamp_cosine <= 0)
@@ -279,11 +285,10 @@ static bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec
     vec3 lamp_normal = vec3_unit(twice_area);
     if (vec3_dot(vec3_sub(point, target), lamp_normal) < 0)
         lamp_normal = vec3_scale(lamp_normal, -1);
-    const float largest = fmaxf(fabsf(target.x), fmaxf(fabsf(target.y), fabsf(target.z)));
-    target = vec3_mul_add(lamp_normal, 9.5367431640625e-7f * fmaxf(largest, light.radius), target);
+    target = vec3_mul_add(lamp_normal, fmaxf(rounding_of(target), 9.5367431640625e-7f * light.radius), target);
 
     out->direction = vec3_sub(target, point);
-    out->far = 0.999999f;
+    out->far = far_of_face;
     const float square = vec3_dot(out->direction, out->direction);
     const float reach = fmaxf(sqrtf(square), 1e-30f);
     const float lamp_cosine = -vec3_dot(out->direction, lamp_normal) / reach;
@@ -294,6 +299,18 @@ static bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec
     const float *radiance = radiance_towards(lights, t, a, twice_area, point);
     scaled(radiance, cosine * lamp_cosine * area / (square * chance), out->irradiance);
     return luminance(radiance) > 0;
+}
+
+bool lights_are_valid(const pl_lights *lights) {
+    for (size_t light = 0; light < lights->count; ++light) {
+        const float *p = parameters_of(lights, light);
+        if (lights->kinds[light] < PL_LIGHT_POINT || lights->kinds[light] > PL_LIGHT_MESH)
+            return false;
+        const float most = (float)lights->triangle_count;
+        if (lights->kinds[light] == PL_LIGHT_MESH && !(p[5] >= 0 && p[6] >= 1 && p[5] + p[6] <= most))
+            return false;
+    }
+    return true;
 }
 
 bool light_is_sharp(const pl_lights *lights, size_t light) {
@@ -326,6 +343,7 @@ static void describe_ball(const pl_lights *lights, size_t light, pl_light_balls 
     default:
         io_balls->strength[light] = 0;
     }
+    io_balls->strength[light] = fminf(io_balls->strength[light], 1e30f);
     const bool is_plain = lights->kinds[light] == PL_LIGHT_POINT && p[12] < -1;
     if (!is_plain)
         io_balls->special[io_balls->special_count++] = light;
@@ -365,7 +383,8 @@ static void ball_importances(const pl_light_balls *balls, vec3 point, vec3 norma
         const float height = x * normal.x + y * normal.y + z * normal.z + radii[i];
         const float best = height < distance ? height : distance;
         const float nearest = square > radii[i] * radii[i] ? square : radii[i] * radii[i];
-        out[i] = best > 0 ? strengths[i] * best / (distance * nearest) : 0;
+        const float light = best > 0 ? strengths[i] * (best / distance / nearest) : 0;
+        out[i] = light < most_light ? light : most_light;
     }
 }
 
@@ -393,7 +412,7 @@ float light_importances(const pl_lights *lights, const pl_light_balls *balls, ve
     ball_importances(balls, point, normal, out_importances);
     for (size_t k = 0; k < balls->special_count; ++k) {
         const size_t light = balls->special[k];
-        out_importances[light] = special_importance(lights, light, point, normal, out_importances[light]);
+        out_importances[light] = bounded(special_importance(lights, light, point, normal, out_importances[light]));
     }
     for (size_t light = 0; light < balls->count; ++light)
         total += out_importances[light];
@@ -409,7 +428,7 @@ bool light_has_closed_form(const pl_lights *lights, size_t light) {
     return lights->kinds[light] == PL_LIGHT_MESH && mesh_of(p).count <= EXACT_TRIANGLES;
 }
 
-bool light_exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]) {
+static bool exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]) {
     const float *p = parameters_of(lights, light);
     if (lights->kinds[light] == PL_LIGHT_AREA) {
         const area_light lamp = area_of(p);
@@ -431,8 +450,16 @@ bool light_exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal,
     return false;
 }
 
-bool light_sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float x, float y,
-                  pl_light_sample *out_sample) {
+bool light_exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]) {
+    if (!exact(lights, light, point, normal, out_rgb))
+        return false;
+    for (int k = 0; k < 3; ++k)
+        out_rgb[k] = bounded(out_rgb[k]);
+    return true;
+}
+
+static bool sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float x, float y,
+                   pl_light_sample *out_sample) {
     const float *p = parameters_of(lights, light);
     switch (lights->kinds[light]) {
     case PL_LIGHT_POINT:
@@ -444,4 +471,13 @@ bool light_sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal
     default:
         return sample_mesh(lights, p, point, normal, x, y, out_sample);
     }
+}
+
+bool light_sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float x, float y,
+                  pl_light_sample *out_sample) {
+    if (!sample(lights, light, point, normal, x, y, out_sample))
+        return false;
+    for (int k = 0; k < 3; ++k)
+        out_sample->irradiance[k] = bounded(out_sample->irradiance[k]);
+    return true;
 }

@@ -15,6 +15,16 @@ typedef struct pl_light_sample {
 
 static inline float luminance(const float rgb[3]) { return 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2]; }
 
+/*
+ * No light is brighter than this, in any unit: the square law has no bound near a lamp, and the square of an estimate
+ * must still be a float. What is no number is no light.
+ */
+static const float most_light = 1e17f;
+static inline float bounded(float light) { return light > 0 ? fminf(light, most_light) : 0; }
+
+/* Whether kinds are known and glowing triangles in range. */
+bool lights_are_valid(const pl_lights *lights);
+
 /* A light that one ray decides: a point or a parallel sun. */
 bool light_is_sharp(const pl_lights *lights, size_t light);
 

@@ -253,13 +253,16 @@ static int by_weight(const void *left, const void *right) {
     return a->chart < b->chart ? -1 : 1;
 }
 
-/* False where a chart is so large that its size is no index. */
+/* False where a corner is negative or no number, or a chart so large that its size is no index. */
 static bool measure(const atlas_job *job, size_t chart, chart_size *out_size) {
     double extent[2] = {0.0, 0.0};
 
     for (size_t c = 3 * (size_t)job->first_triangles[chart]; c < 3 * (size_t)job->first_triangles[chart + 1]; ++c)
-        for (int axis = 0; axis < 2; ++axis)
+        for (int axis = 0; axis < 2; ++axis) {
+            if (!(job->uvs[2 * c + (size_t)axis] >= 0.0))
+                return false;
             extent[axis] = fmax(extent[axis], job->uvs[2 * c + (size_t)axis]);
+        }
     out_size->chart = chart;
     for (int axis = 0; axis < 2; ++axis) {
         /* the last block within reach of the chart's far end */
@@ -280,7 +283,8 @@ static bool are_runs(const int32_t *first, size_t count, size_t end) {
 
 pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t *first_triangles, size_t chart_count,
                          double density, int32_t width, int32_t block, int32_t *out_places, int32_t *out_height) {
-    if (!(density > 0.0) || block < 1 || width < block || !are_runs(first_triangles, chart_count, triangle_count))
+    if (!(density > 0.0) || block < 1 || width < block || width > PL_WIDEST_ATLAS ||
+        !are_runs(first_triangles, chart_count, triangle_count))
         return PL_ERR_ARGUMENT;
 
     atlas_job job = {.uvs = uvs, .first_triangles = first_triangles, .density = density / (double)block};

@@ -74,6 +74,10 @@ void pl_patches_destroy(pl_patches *patches) {
 
 size_t pl_patches_count(const pl_patches *patches) { return patches->patch_count; }
 
+bool pl_patches_fit(const pl_patches *patches, const pl_scene *scene) {
+    return patches->triangle_count == scene->triangle_count;
+}
+
 pl_barycentric point_in_patch(const pl_patches *patches, size_t patch, float x, float y) {
     const int32_t row = patches->patch_rows[patch];
     const int32_t triangle = patches->row_triangles[row];

@@ -86,6 +86,14 @@ static bool indices_are_in_range(const int32_t *triangles, size_t triangle_count
     return true;
 }
 
+/* What is farther away, or not a number, would overflow as rays square distances. */
+static bool coordinates_are_in_range(const double *vertices, size_t vertex_count) {
+    for (size_t i = 0; i < 3 * vertex_count; ++i)
+        if (!(fabs(vertices[i]) <= PL_LARGEST_COORDINATE))
+            return false;
+    return true;
+}
+
 static void *copy_of(const void *bytes, size_t size) {
     void *copy = malloc(size ? size : 1);
     if (copy && size)
@@ -96,7 +104,8 @@ static void *copy_of(const void *bytes, size_t size) {
 pl_status pl_scene_create(const pl_embree *embree, const double *vertices, size_t vertex_count,
                           const int32_t *triangles, size_t triangle_count, const float *transmittance,
                           pl_scene **out_scene) {
-    if (!indices_are_in_range(triangles, triangle_count, vertex_count))
+    if (!indices_are_in_range(triangles, triangle_count, vertex_count) ||
+        !coordinates_are_in_range(vertices, vertex_count))
         return PL_ERR_ARGUMENT;
     pl_status status = PL_ERR_MEMORY;
     pl_scene *scene = calloc(1, sizeof *scene);

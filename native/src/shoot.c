@@ -38,7 +38,9 @@ void pl_shoot(const pl_scene *scene, const pl_patches *patches, const uint64_t *
               const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count, uint32_t seed,
               uint64_t *io_received, uint64_t *io_escaped) {
     const size_t side_count = 2 * patches->patch_count;
-    size_t side = count ? owner_of_ray(first_rays, side_count, first) : 0;
+    if (!count)
+        return;
+    size_t side = owner_of_ray(first_rays, side_count, first);
     pl_side_frame frame = side_frame(scene, patches, side);
 
     for (uint64_t ray = first; ray < first + count; ++ray) {

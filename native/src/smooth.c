@@ -28,7 +28,7 @@ static float geometric_weight(const smooth_job *job, size_t a, size_t b, float t
     const float cosine = vec3_dot(n, vec3_from(job->receivers->normals + 3 * b));
     const float reach = job->grid->spacing * texels_apart;
     /* a neighbour in the atlas that is further away in space than its texels are belongs to another chart */
-    if (cosine < 0.9f || vec3_dot(apart, apart) > 4 * reach * reach)
+    if (cosine < 0.9f || !(reach > 0) || vec3_dot(apart, apart) > 4 * reach * reach)
         return 0;
     const float height = vec3_dot(apart, n) / reach;
     const float square = cosine * cosine, fourth = square * square;

@@ -216,14 +216,6 @@ def test_darkness_bakes_to_zero(target):
     assert result.report.target_reached
 
 
-@pytest.mark.parametrize("target", ["lightmap", "vertex"])
-def test_faces_without_area_bake_to_finite_colours(target):
-    sliver = Part([(0.2, 0.2, 0.5), (0.4, 0.4, 0.5), (0.8, 0.8, 0.5)], [(0, 1, 2)], name="sliver")
-    scene = scene_of([box((0, 0, 0), (1, 1, 1), inwards=True), sliver], cube_room().lights)
-    result = bake(scene, BakeSettings(target=target, texels=1024, error=0.2, patch_size=COARSE))
-    assert np.isfinite(result.lightmap.pixels if result.lightmap else result.corner_colours).all()
-
-
 @pytest.mark.parametrize("settings", [{"target": "vertex"}, {}, {"solver": "progressive"}, {"solver": "direct"}])
 def test_progress_rises_to_the_end_and_comes_from_the_calling_thread(settings):
     told = []

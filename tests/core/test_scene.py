@@ -5,7 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.scene import Material, SceneError, SceneObject, exitance_from_radiance, radiance_from_exitance
+from addon.core.scene import (
+    Material,
+    PointLight,
+    SceneError,
+    SceneObject,
+    SunLight,
+    Texture,
+    exitance_from_radiance,
+    radiance_from_exitance,
+)
 from tests.scenes import closed_box, cornell_box
 
 
@@ -43,14 +52,33 @@ def test_indices_out_of_range_are_refused_with_their_row(name, bad):
         replace(scene, **{name: indices})
 
 
-@pytest.mark.parametrize("name", ["vertices", "corner_normals"])
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_numbers_that_are_not_finite_are_refused_with_their_row(name, bad):
-    scene = closed_box()
-    numbers = getattr(scene, name).copy()
-    numbers[3] = bad
-    with pytest.raises(SceneError, match=rf"{name}\[3\] is not finite"):
-        replace(scene, **{name: numbers})
+NUMBERS_OUT_OF_RANGE = [
+    (Material, {"reflectance": (0.5, 1.5, 0.5)}, "material it: reflectance"),
+    (Material, {"reflectance": (np.nan, 0.5, 0.5)}, "material it: reflectance"),
+    (Material, {"radiance": (-1.0, 0.0, 0.0)}, "material it: radiance"),
+    (Material, {"transmittance": (0.0, 2.0, 0.0)}, "material it: transmittance"),
+    (PointLight, {"position": (0, 0, np.inf), "intensity": (1, 1, 1)}, "light it: position"),
+    (PointLight, {"position": (0, 0, 0), "intensity": (1, 1e30, 1)}, "light it: intensity"),
+    (PointLight, {"position": (0, 0, 0), "intensity": (1, 1, 1), "radius": -1.0}, "light it: radius"),
+    (PointLight, {"position": (0, 0, 0), "intensity": (1, 1, 1), "direction": (0, 0, 0)}, "light it: direction"),
+    (PointLight, {"position": (0, 0), "intensity": (1, 1, 1)}, "light it: position"),
+    (SunLight, {"direction": (np.nan, 0, 1), "irradiance": (1, 1, 1)}, "light it: direction"),
+    (SunLight, {"direction": (0, 0, 1), "irradiance": (1, 1, 1), "angle": 7.0}, "light it: angle"),
+    (Texture, {"pixels": np.full((1, 1, 3), np.nan, np.float32)}, "image it: 1 pixels"),
+    (Texture, {"pixels": np.zeros((0, 1, 3), np.float32)}, "image it: expected"),
+    (Texture, {"pixels": np.zeros((1, 1, 3))}, "image it: expected"),
+]
+
+
+@pytest.mark.parametrize(("kind", "fields", "message"), NUMBERS_OUT_OF_RANGE)
+def test_numbers_out_of_range_are_refused_with_their_owner(kind, fields, message):
+    with pytest.raises(SceneError, match=message):
+        kind("it", **fields)
+
+
+def test_arrays_of_an_object_have_a_row_a_triangle():
+    with pytest.raises(SceneError, match="object it: polygons: expected"):
+        SceneObject("it", 0, 2, polygons=np.zeros(3, np.int32))
 
 
 def test_objects_are_runs_without_gaps():

@@ -1,0 +1,83 @@
+"""What random meshes have found, each as a case of its own: lamps in faces, atoms, slivers, white rooms."""
+
+import numpy as np
+import pytest
+
+from addon.core.bake import bake
+from addon.core.patches import subdivide
+from addon.core.scene import AreaLight, Material, PointLight
+from addon.core.settings import BakeSettings, SettingsError
+from tests.physics.lighting import SINGLE, direct_light, floor
+from tests.scenes import Part, closed_box, cube_room, kernel_of, lamp, scene_of
+
+QUICK = {"target": "vertex", "error": 0.3, "patch_size": 0.5, "threads": 2}
+
+
+@pytest.mark.parametrize("radius", [1e-30, 1e-12, 1e-6])
+def test_a_lamp_the_size_of_an_atom_shines_as_a_point(radius):
+    points = [(0.0, 0.0, 0.0), (1.0, 0.5, 0.0)]
+    atom, _ = direct_light([lamp((0.2, 0.1, 1.5), radius=radius)], points)
+    point, _ = direct_light([lamp((0.2, 0.1, 1.5))], points)
+    assert atom == pytest.approx(point, rel=SINGLE)
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-30, 1e-7])
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+def test_a_lamp_in_a_face_gives_light_that_is_a_number(height, radius):
+    points = [(0.0, 0.0, 0.0), (1e-4, 0.0, 0.0), (1.0, 0.0, 0.0)]
+    light, variance = direct_light([lamp((0.0, 0.0, height), intensity=(1e15,) * 3, radius=radius)], points)
+    assert np.isfinite(light).all()
+    assert (light >= 0).all()
+    assert np.isfinite(variance).all()
+
+
+@pytest.mark.parametrize("solver", ["stochastic", "progressive", "direct"])
+def test_a_closed_room_that_absorbs_nothing_is_given_up_and_named(solver):
+    """Its light has no bound: what comes out is finite, much more than the lamp gives, and not called finished."""
+    settings = BakeSettings(**{**QUICK, "solver": solver, "error": 1.0})
+    result = bake(cube_room(material=Material("white", (1.0, 1.0, 1.0))), settings)
+    grey = bake(cube_room(), settings)
+    assert np.isfinite(result.corner_colours).all()
+    assert result.corner_colours.mean() > 10 * grey.corner_colours.mean()
+    is_told = any("of the light unshot" in warning for warning in result.report.warnings)
+    # the dense system is solved at a reflectance of 0.9999, whatever that gives
+    assert is_told == (solver != "direct")
+    assert not any("of the light unshot" in warning for warning in grey.report.warnings)
+
+
+@pytest.mark.parametrize("length", [1e3, 1e7])
+def test_a_sliver_takes_no_more_patches_than_its_share(length):
+    sliver = Part([(0, 0, 0), (length, 0, 0), (length, 1e-3 * length, 0)], [(0, 1, 2)])
+    scene = scene_of([sliver])
+    with kernel_of(scene) as kernel:
+        patches = subdivide(scene, kernel, 0.01, 1000, 0)
+    # an eighth of the budget, and one more in every row that is rounded up
+    assert len(patches) <= 2 * 1000 / 8
+    assert patches.areas.sum() == pytest.approx(0.5e-3 * length**2)
+
+
+def test_patches_that_no_memory_holds_are_refused():
+    with pytest.raises(SettingsError, match="patch_size is 1e-06"):
+        bake(many_faces(), BakeSettings(**{**QUICK, "patch_size": 1e-6}))
+
+
+def many_faces():
+    """A thousand triangles, each of which may take its share of patches."""
+    points = np.random.default_rng(0).random((3000, 3))
+    return scene_of([Part(points, np.arange(3000).reshape(-1, 3).tolist())], [lamp()])
+
+
+def test_lights_as_bright_as_can_be_add_up_to_a_number():
+    lights = [
+        PointLight("lamp", (0.5, 0.5, 0.5), (1e15,) * 3, radius=0.01),
+        AreaLight("panel", (0.5, 0.5, 1.0), (0, 0.1, 0), (0.1, 0, 0), (1e15,) * 3, spread=1e-3),
+    ]
+    colours = bake(closed_box(lights=lights), BakeSettings(**QUICK)).corner_colours
+    assert np.isfinite(colours).all()
+    assert (colours > 0).all()
+
+
+def test_a_lamp_below_a_floor_lights_nothing_above_it():
+    """However near it is below: shadow rays end a rounding before the lamp, not before the floor."""
+    light, _ = direct_light([lamp((0.0, 0.0, -1e-3))], [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0)], parts=(floor(2.0),))
+    assert (light == 0).all()
