@@ -158,23 +158,28 @@ def exchanges(first, others):
     heights = (others - origin) @ normal
     heights[np.abs(heights) < 1e-12 * np.abs(others - origin).max()] = 0.0
     parts, is_seen = clip_all(others, heights)
+    if not len(parts):
+        return np.zeros(len(others))
     out, values = np.zeros(len(others)), np.zeros(len(parts))
     (centre, radius), centres = _radius(first), parts.mean(axis=1)
     radii = np.sqrt(((parts - centres[:, None]) ** 2).sum(axis=2).max(axis=1))
     is_far = np.linalg.norm(centres - centre, axis=1) > 2 * (radius + radii)
     values[is_far] = _gauss_exchanges(first, parts[is_far], 4)
     near = parts[~is_far]
-    values[~is_far] = contour_exchanges(np.broadcast_to(first, (len(near), *first.shape)), near)[0]
+    if len(near):
+        values[~is_far] = contour_exchanges(np.broadcast_to(first, (len(near), *first.shape)), near)[0]
     out[is_seen] = np.maximum(values, 0.0)
     return out
 
 
 def _gauss_exchanges(first, others, count):
+    if not len(others):
+        return np.zeros(0)
     points, weights = polygon_rule(first, count)
     barycentrics, shares = triangle_rule(count)
     out = []
-    for part in np.array_split(others, -(-len(others) // 256) or 1):
-        triangles = np.stack([fan(corners) for corners in part]) if len(part) else np.zeros((0, 1, 3, 3))
+    for part in np.array_split(others, -(-len(others) // 256)):
+        triangles = np.stack([fan(corners) for corners in part])
         there = np.einsum("qc,ntcx->ntqx", barycentrics, triangles).reshape(len(part), 1, -1, 3)
         areas = (triangle_areas(triangles)[..., None] * shares).reshape(len(part), -1)
         to = there - points[:, None]

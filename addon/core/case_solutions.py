@@ -1,0 +1,311 @@
+"""Cases whose quantity is radiosity: form factors by the estimator, then the direct solver."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from . import case_scene as scenes
+from .analytic import Surface, cut_overlaps, surface, without
+from .bodies import Body, Ring, disk, sphere
+from .case_factors import concentric_matrix
+from .cases import NUMBER, Case, CaseError
+from .polygon import clip, extent, fault_of, heights_above, unit_normal
+from .solver import solve_direct
+from .transport import Estimate
+
+
+def solve(form_factors, reflectance, emitted, areas):
+    """Radiosity (N,) [W/m^2] by the direct solver, one channel."""
+    reflectance, emitted = (np.broadcast_to(np.asarray(x, float), len(areas))[:, None] for x in (reflectance, emitted))
+    return solve_direct(form_factors, reflectance, np.ascontiguousarray(emitted), np.asarray(areas)).radiosity[:, 0]
+
+
+def solved(values, stated: float = 0.01) -> Estimate:
+    """Results of a solve; how wrong they may be is not stated entry by entry but as a share."""
+    values = np.asarray(values, np.float64)
+    return Estimate(values, np.zeros_like(values), stated * np.abs(values))
+
+
+def _areas(surfaces):
+    return np.array([s.area for s in surfaces])
+
+
+# ---- rooms of polygons ----
+
+
+def furnace_case(case: Case, estimator) -> Estimate:
+    """``B everywhere`` with E and rho the same on all faces: in the case's own room, or a cube, a tetrahedron, an L-room."""
+    rho = case.number("rho")
+    emitted = case.number("E", 1 - rho)
+    scene = scenes.case_scene(case)
+    rooms = [list(scene.surfaces.values())] if scene.surfaces else []
+    rooms = rooms or [scenes.box((0, 0, 0), (1, 1, 1)), scenes.tetrahedron(), scenes.l_room()]
+    found = [
+        solve(estimator.matrix(room, scene.blockers).value, rho, emitted, _areas(room)) for room in rooms
+    ]
+    return solved(np.concatenate(found))
+
+
+def faces_case(case: Case, estimator) -> Estimate:
+    """``B per face``: a closed room, its own or a box that the quantity names, params rho and E per face."""
+    surfaces, blockers = _room_of(case)
+    rho, emitted = case.numbers("rho"), case.numbers("E")
+    found = estimator.matrix(surfaces, blockers)
+    return solved(solve(found.value, rho, emitted, _areas(surfaces)))
+
+
+def zero_albedo_case(case: Case, estimator) -> Estimate:
+    """``B-E`` where rho = 0."""
+    surfaces, blockers = _room_of(case, default="cube")
+    emitted = 1.0 + np.arange(len(surfaces))
+    found = estimator.matrix(surfaces, blockers)
+    return solved(np.abs(solve(found.value, 0.0, emitted, _areas(surfaces)) - emitted).max())
+
+
+def _room_of(case, default=""):
+    scene = scenes.case_scene(case)
+    surfaces = list(scene.surfaces.values()) or scenes.room_named(f"{case.quantity} {case.id} {default}")
+    if not surfaces:
+        raise CaseError("no room is given")
+    return surfaces, scene.blockers
+
+
+def pinhole_case(case: Case, estimator) -> Estimate:
+    """Furnace in a cube with a square hole in one face: B of the opposite face, of the rest of that face, of the walls,
+    and the power that escapes."""
+    rho = case.number("rho", 0.9)
+    emitted = case.number("E", 1 - rho)
+    scene = scenes.case_scene(case)
+    cube = scenes.box((0, 0, 0), (1, 1, 1))
+    hole = scene.surfaces.get("hole") or _square_hole(case.number("s"))
+    frames = [without(face, hole) if _lies_in(hole, face) else face for face in cube]
+    pierced = next(k for k, (a, b) in enumerate(zip(frames, cube)) if a is not b)
+    surfaces = [*frames, hole]
+    found = estimator.matrix(surfaces)
+    reflectance, emission = np.full(7, rho), np.full(7, emitted)
+    reflectance[6] = emission[6] = 0.0
+    radiosity = solve(found.value, reflectance, emission, _areas(surfaces))
+    walls = [k for k in range(6) if k // 2 != pierced // 2]
+    escaped = hole.area * (found.value[6] @ radiosity)
+    return solved([radiosity[pierced ^ 1], radiosity[pierced], radiosity[walls].mean(), escaped])
+
+
+def _square_hole(size):
+    a, b = 0.5 - size / 2, 0.5 + size / 2
+    return surface("hole", [(a, a, 1), (a, b, 1), (b, b, 1), (b, a, 1)])
+
+
+def _lies_in(hole, face):
+    return len(cut_overlaps([hole, face])[1].pieces) > 1
+
+
+def slit_case(case: Case, estimator) -> dict:
+    """A room lit through a slit in its partition, behind which all is black with radiosity 1: mean irradiance and
+    radiosity per face, irradiance at points."""
+    scene = scenes.case_scene(case)
+    names = list(scene.surfaces)
+    slit = scene.named("slit")
+    faces = [scene.surfaces[n] for n in names if n != "slit"]
+    faces = [without(face, slit) if _lies_in(slit, face) else face for face in faces]
+    surfaces = [*faces, slit]
+    found = estimator.matrix(surfaces, scene.blockers)
+    count, out = len(faces), {}
+    for key, expected in case.exact.items():
+        if key.startswith("H_direct"):
+            out[key] = solved(found.value[:count, count])
+        elif key.startswith("B_rho"):
+            rho = np.full(count + 1, float(re.sub(r"^0", "0.", key[len("B_rho") :])))
+            rho[count] = 0.0
+            emitted = np.zeros(count + 1)
+            emitted[count] = 1.0
+            out[key] = solved(solve(found.value, rho, emitted, _areas(surfaces))[:count])
+        elif key.startswith("H_points"):
+            points = _points_of(case, len(expected))
+            seen = [estimator.element(p, _normal_at(p, faces), slit, scene.blockers) for p in points]
+            out[key] = solved([float(s.value) for s in seen])
+        else:
+            raise CaseError(f"result {key!r} is not understood")
+    return out
+
+
+def _points_of(case, count):
+    words = " ".join(str(p) for p in case.params.get("points", ()))
+    triple = rf"\(\s*({NUMBER})\s*,\s*({NUMBER})\s*,\s*({NUMBER})\s*\)"
+    points = np.array(re.findall(triple, words.replace("[", "(").replace("]", ")")), float).reshape(-1, 3)
+    if len(points) != count:
+        raise CaseError(f"{count} points are wanted and {len(points)} are given")
+    return points
+
+
+def _normal_at(point, faces):
+    for face in faces:
+        for piece in face.pieces:
+            inward = np.cross(unit_normal(piece), np.roll(piece, -1, axis=0) - piece)
+            depth = ((point - piece) * inward).sum(axis=1)
+            size = extent(piece)
+            if abs((point - piece[0]) @ unit_normal(piece)) < 1e-9 * size and (depth >= -1e-9 * size**2).all():
+                return unit_normal(piece)
+    raise CaseError(f"the point {tuple(float(x) for x in point)} lies on no face")
+
+
+def divided_rooms_case(case: Case, estimator) -> Estimate:
+    """``max B in room 2``: two boxes on either side of a wall, a furnace in room 1, no emission in room 2.
+
+    A floor that reaches through both is split at the wall, as a mesher must.
+    """
+    scene = scenes.case_scene(case)
+    wall = next((s for name, s in scene.surfaces.items() if "wall" in name), None)
+    if wall is None:
+        raise CaseError("no wall is given")
+    rho = case.number("rho", 0.5)
+    thicknesses = case.numbers("thickness") if "thickness" in case.params else [0.0]
+    floors = [s for s in scene.surfaces.values() if s is not wall]
+    largest = [_light_behind(wall, floors, float(t), rho, estimator) for t in thicknesses]
+    return solved(max(largest))
+
+
+def _light_behind(wall, floors, thickness, rho, estimator):
+    corners = np.concatenate([p for s in [wall, *floors] for p in s.pieces])
+    normal = unit_normal(wall.pieces[0])
+    axis = int(np.argmax(np.abs(normal)))
+    low, high, place = corners.min(axis=0), corners.max(axis=0), wall.pieces[0][0, axis]
+    reach = np.ptp(corners, axis=0).max()
+    if high[axis] - low[axis] < 1e-9 * reach:
+        low[axis], high[axis] = place - reach, place + reach
+    top, bottom = high.copy(), low.copy()
+    top[axis], bottom[axis] = place - thickness / 2, place + thickness / 2
+    rooms = [_with_floors(scenes.box(*ends), floors) for ends in ((low, top), (bottom, high))]
+    surfaces = rooms[0] + rooms[1]
+    lit = np.arange(len(surfaces)) < len(rooms[0])
+    found = estimator.matrix(surfaces, [wall])
+    radiosity = solve(found.value, rho, np.where(lit, 1 - rho, 0.0), _areas(surfaces))
+    return radiosity[~lit].max()
+
+
+def _with_floors(faces, floors):
+    """The faces of a box, those that coincide with a given floor replaced by the part of the floor over them."""
+    out = []
+    for face in faces:
+        parts = [part for floor in floors for piece in floor.pieces for part in [_common(piece, face.pieces[0])] if len(part)]
+        out.append(Surface(face.name, tuple(parts)) if parts else face)
+    return out
+
+
+def _common(piece, face):
+    if heights_above(piece, face[0], unit_normal(face)).any() or unit_normal(piece) @ unit_normal(face) < 0:
+        return np.empty((0, 3))
+    inward = np.cross(unit_normal(face), np.roll(face, -1, axis=0) - face)
+    for origin, normal in zip(face, inward / np.linalg.norm(inward, axis=1, keepdims=True)):
+        piece = clip(piece, heights_above(piece, origin, normal))
+        if not len(piece) or fault_of(piece):
+            return np.empty((0, 3))
+    return piece
+
+
+def plates_case(case: Case, estimator) -> Estimate:
+    """``B1,B2`` of infinite parallel plates: square plates a million times as wide as their gap."""
+    rho, emitted = _pair(case, "rho"), _pair(case, "E")
+    plates = [
+        surface("1", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]),
+        surface("2", [(0, 0, 1e-6), (0, 1, 1e-6), (1, 1, 1e-6), (1, 0, 1e-6)]),
+    ]
+    return solved(solve(estimator.matrix(plates).value, rho, emitted, _areas(plates)))
+
+
+def _pair(case, name):
+    if name in case.params:
+        return case.numbers(name)
+    return np.array([case.number(f"{name}1"), case.number(f"{name}2")])
+
+
+# ---- spheres ----
+
+
+def zones_case(case: Case, estimator) -> Estimate:
+    """Irradiance in a sphere, the same everywhere, and B per zone: params rows of area fraction, rho, E."""
+    key = next((k for k in case.params if k.startswith("zones")), None)
+    if key is None:
+        raise CaseError("no zones are given")
+    shares, rho, emitted = case.numbers(key).T
+    irradiance, radiosity = _zones(shares, rho, emitted, estimator)
+    if case.quantity.startswith("irradiance"):
+        return solved([irradiance, *radiosity])
+    return solved(radiosity)
+
+
+def _zones(shares, rho, emitted, estimator):
+    zones = [
+        sphere(f"zone{k}", 1.0, angles, scenes.SPHERE_SIDES, looks_in=True)
+        for k, angles in enumerate(scenes.zone_angles(shares))
+    ]
+    areas = np.array([zone.area for zone in zones])
+    found = estimator.body_matrix(zones)
+    radiosity = solve(found.value, rho, emitted, areas)
+    return areas @ (found.value @ radiosity) / areas.sum(), radiosity
+
+
+def lit_cap_case(case: Case, estimator) -> Estimate:
+    """``B wall, B cap``: a sphere of which a cap of area fraction f emits."""
+    f, rho = case.number("f"), case.number("rho")
+    _, radiosity = _zones([f, 1 - f], np.array([rho, rho]), np.array([case.number("E", 1.0), 0.0]), estimator)
+    wall_first = case.quantity.lower().find("wall") < case.quantity.lower().find("cap")
+    return solved(radiosity[::-1] if wall_first else radiosity)
+
+
+def cavity_case(case: Case, estimator) -> Estimate:
+    """Sphere with a cap of area fraction f removed, E = 1 - rho: B of the wall, escaped over emitted power, emissivity."""
+    f, rho = case.number("f"), case.number("rho")
+    emitted = case.number("E", 1 - rho)
+    wall, opening = _sphere_with_port(1.0, f, 0.0, True)
+    found = estimator.body_matrix([wall, opening])
+    areas = np.array([wall.area, opening.area])
+    radiosity = solve(found.value, np.array([rho, 0.0]), np.array([emitted, 0.0]), areas)
+    leaving = found.value[1, 0] * radiosity[0]
+    return solved([radiosity[0], areas[1] * leaving / (areas[0] * emitted), leaving * (1 - rho) / emitted])
+
+
+def _sphere_with_port(radius, fraction, centre, port_above):
+    """A sphere without a polar cap, and the polygon that closes it, both seen from inside."""
+    edge = np.arccos(1 - 2 * fraction)
+    angles = np.linspace(edge, np.pi, scenes.SPHERE_RINGS + 1)
+    wall = sphere("wall", radius, angles, scenes.SPHERE_SIDES, looks_in=True, centre=centre)
+    port = disk("port", radius * np.sin(edge), centre + radius * np.cos(edge), scenes.SPHERE_SIDES, looks_up=False)
+    if port_above:
+        return wall, port
+    flipped = [Body(b.name, tuple(Ring((r.panels * (1, 1, -1))[:, ::-1]) for r in b.rings)) for b in (wall, port)]
+    return flipped[0], flipped[1]
+
+
+def port_case(case: Case, estimator) -> Estimate:
+    """Two spheres that share a circular port, B1, B2 and B2 / B1.
+
+    What enters the port from one side leaves it on the other, diffuse, as the light of a sphere is the same everywhere:
+    each side of the port radiates the irradiance of the other.
+    """
+    f = [case.number("f1"), case.number("f2")]
+    radii = [case.number("R1", 1.0), case.number("R2", np.sqrt(f[0] * (1 - f[0]) / (f[1] * (1 - f[1]))))]
+    rho, emitted = _pair(case, "rho"), _pair(case, "E")
+    system, areas = np.zeros((4, 4)), np.zeros(4)
+    reflectance, emission = np.ones(4), np.zeros(4)
+    for k in range(2):
+        bodies = _sphere_with_port(radii[k], f[k], 0.0, True)
+        found = estimator.body_matrix(list(bodies)).value
+        wall, port, behind = 2 * k, 2 * k + 1, 2 * (1 - k) + 1
+        areas[[wall, port]] = [body.area for body in bodies]
+        system[wall, wall], system[wall, port] = found[0]
+        # irradiance of this side of the port is what its other side radiates
+        system[behind, wall] = found[1, 0]
+        reflectance[wall], emission[wall] = rho[k], emitted[k]
+    radiosity = solve(system, reflectance, emission, areas)
+    return solved([radiosity[0], radiosity[2], radiosity[2] / radiosity[0]])
+
+
+def concentric_case(case: Case, estimator) -> Estimate:
+    """``B inner, B outer`` of concentric spheres r1, r2."""
+    r1, r2 = case.number("r1", 1.0), case.number("r2", 2.0)
+    found = concentric_matrix(r1, r2, estimator)
+    return solved(solve(found.value, _pair(case, "rho"), _pair(case, "E"), np.array([r1**2, r2**2])))
+
+
