@@ -71,14 +71,19 @@ def without(whole: Surface, hole: Surface) -> Surface:
 
 
 def cut_overlaps(surfaces):
-    """Surfaces of which none covers another: of coplanar ones that face the same way, the first keeps what they share."""
-    kept: list[Surface] = []
-    for new in surfaces:
-        for old in kept:
+    """Surfaces of which none covers another: of coplanar ones that face the same way, the smaller keeps what they share.
+
+    A lamp in a ceiling is smaller than the ceiling; of duplicates the first keeps all, the others are left without pieces.
+    """
+    kept: dict[int, Surface] = {}
+    areas = [one.area for one in surfaces]
+    for k in sorted(range(len(surfaces)), key=areas.__getitem__):
+        new = surfaces[k]
+        for old in kept.values():
             if new.pieces and old.pieces and _share_a_plane(new.pieces[0], old.pieces[0]):
                 new = without(new, old)
-        kept.append(new)
-    return kept
+        kept[k] = new
+    return [kept[k] for k in range(len(surfaces))]
 
 
 def _share_a_plane(first, second):

@@ -52,7 +52,7 @@ class Case:
                 return float(value)
             except ValueError:
                 pass
-        found = re.search(rf"(?<![\w.]){re.escape(name)}\s*=\s*({NUMBER})", self.text)
+        found = re.search(rf"(?<![\w.]){re.escape(name)}\s*=\s*({NUMBER})(?![\w.*/+-])", self.text)
         if found:
             return float(found.group(1))
         if default is not None:

@@ -16,6 +16,7 @@ from .scene import Material, Scene, SceneObject
 from .transport import REPLICATES, Estimate, HemicubeFormFactors, MonteCarloFormFactors, estimate, replicated
 from .workers import Workers
 
+PANEL_ERROR = 1e-3  # relative, of flat panels for curved bodies: falls with the square of their size
 METHODS = ("analytic", "hemicube", "monte-carlo")
 
 
@@ -41,12 +42,12 @@ class AnalyticEstimator:
     def body_matrix(self, bodies: list[Body]) -> Estimate:
         """F of all pairs of bodies of revolution between which nothing stands, float64 (N, N)."""
         areas = np.array([body.area for body in bodies])
-        return _certain(body_exchanges(bodies) / areas[:, None])
+        return _certain(body_exchanges(bodies) / areas[:, None], PANEL_ERROR)
 
 
-def _certain(value):
+def _certain(value, relative=1e-7):
     value = np.asarray(value, np.float64)
-    return Estimate(value, np.zeros_like(value), 1e-7 * np.abs(value))
+    return Estimate(value, np.zeros_like(value), relative * np.abs(value))
 
 
 @dataclass(frozen=True, slots=True)

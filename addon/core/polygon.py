@@ -66,11 +66,35 @@ def is_convex(corners) -> bool:
 
 
 def convex_pieces(corners) -> list[np.ndarray]:
-    """Convex pieces that make up a polygon (K, 3): itself where it is convex and planar, else triangles."""
+    """Convex pieces that make up a polygon (K, 3): itself where it is convex and planar, else few, or triangles."""
     corners = without_repeats(corners)
-    if is_planar(corners) and is_convex(corners):
-        return [corners]
-    return triangulate(corners)
+    if not is_planar(corners):
+        return triangulate(corners)
+    return [corners] if is_convex(corners) else merged(triangulate(corners))
+
+
+def merged(pieces) -> list[np.ndarray]:
+    """Coplanar convex pieces joined along shared edges as long as they stay convex (Hertel & Mehlhorn 1983)."""
+    pieces = list(pieces)
+    for i in range(len(pieces) - 1, 0, -1):
+        for j in range(i):
+            union = _joined(pieces[j], pieces[i])
+            if union is not None and is_convex(union):
+                pieces[j] = union
+                del pieces[i]
+                break
+    return pieces
+
+
+def _joined(first, second):
+    """Two polygons as one, without the edge that they share; None where they share none."""
+    for k, a in enumerate(first):
+        b = first[(k + 1) % len(first)]
+        for m, c in enumerate(second):
+            if (c == b).all() and (second[(m + 1) % len(second)] == a).all():
+                rest = np.roll(second, -m - 2, axis=0)[: len(second) - 2]
+                return np.concatenate([first[: k + 1], rest, first[k + 1 :]])
+    return None
 
 
 def without_repeats(corners):

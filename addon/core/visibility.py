@@ -16,7 +16,7 @@ from .polygon import above, bisect, clip, extent, fault_of, heights_above, unit_
 from .quadrature import fan, triangle_areas, triangle_rule
 
 COARSE, FINE = 3, 5  # nodes along a triangle's side; the difference is the error of a cell
-LINES_AT_ONCE = 48  # with fewer kinks, all cells are cut along all of them at the start
+KINKS_AT_ONCE, CELLS_AT_ONCE = 200, 400  # with no more kinks than this, cells are cut along all of them at the start
 GENERATIONS = 14
 CELL_LIMIT = 20000
 HIDDEN_ERROR = 1e-7  # of the unobstructed exchange, to which the hidden part is integrated
@@ -158,11 +158,8 @@ def clip_all(polygons, heights):
 
 def integrate_partly_hidden(first, second, occluders) -> PartlyHidden:
     """Integrate the visible and the hidden factor over the first polygon, cells halved until the smaller is good."""
-    kinks = _kink_planes(first, second, occluders)
-    cells = [first]
-    if len(kinks) <= LINES_AT_ONCE:
-        for origin, normal in kinks:
-            cells = [part for cell in cells for part in _cut(cell, origin, normal)]
+    kinks = _kinks(first, second, occluders)
+    cells = _cut_along_all(first, kinks) if 0 < len(kinks) <= KINKS_AT_ONCE else [first]
     done = np.zeros(3)
     normal = unit_normal(first)
     for generation in range(GENERATIONS):
@@ -204,28 +201,80 @@ def _chunks(points, size=20000):
     return np.array_split(points, -(-len(points) // size))
 
 
-def _kink_planes(first, second, occluders):
-    """Planes through a corner of an occluder and an edge of the target, or the other way round, that cut ``first``."""
-    origins, normals = [], []
+@dataclass(frozen=True, slots=True)
+class Kinks:
+    """Segments in the plane of the positions across which the hidden factor is not smooth.
+
+    Attributes
+    ----------
+    origins, normals : float64 (M, 3) the planes that cut the positions' plane along them
+    along : float64 (M, 3) their directions, unit
+    low, high : float64 (M,) where they start and stop, as points . along; infinite where they do not
+    """
+
+    origins: np.ndarray
+    normals: np.ndarray
+    along: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.origins)
+
+    def evenness(self, cell):
+        """How evenly each divides a cell (K, 3): the smaller of two heights over their sum, 0 where it misses it."""
+        heights = ((cell[None] - self.origins[:, None]) * self.normals[:, None]).sum(axis=2)
+        after = np.roll(heights, -1, axis=1)
+        crosses = heights * after < 0
+        share = heights / np.where(crosses, heights - after, 1.0)
+        positions = cell @ self.along.T
+        crossings = positions.T + share * (np.roll(positions, -1, axis=0) - positions).T
+        low = np.where(crosses, crossings, np.inf).min(axis=1)
+        high = np.where(crosses, crossings, -np.inf).max(axis=1)
+        size = extent(cell)
+        meets = np.minimum(high, self.high) - np.maximum(low, self.low) > 1e-9 * size
+        top, bottom = heights.max(axis=1), -heights.min(axis=1)
+        return np.where(meets, np.minimum(top, bottom) / np.maximum(top + bottom, 1e-300), 0.0)
+
+
+def _kinks(first, second, occluders) -> Kinks:
+    """Where lines through a corner of an occluder and an edge of the target, or the other way round, meet ``first``.
+
+    And where the plane of an occluder does: there it is seen edge-on, and what is seen beside it changes.
+    """
+    normal, columns = unit_normal(first), []
     for occluder in occluders:
         for corners, edges in ((occluder, second), (second, occluder)):
             corner, edge = (grid.ravel() for grid in np.meshgrid(np.arange(len(corners)), np.arange(len(edges))))
-            start, stop = edges[edge], edges[(edge + 1) % len(edges)]
-            origins.append(start)
-            normals.append(np.cross(stop - start, corners[corner] - start))
-    origins, normals = np.concatenate(origins), np.concatenate(normals)
-    lengths = np.linalg.norm(normals, axis=1)
-    kept = lengths > 0
-    origins, normals = origins[kept], normals[kept] / lengths[kept, None]
-    heights = ((first[None] - origins[:, None]) * normals[:, None]).sum(axis=2)
-    rounding = 1e-9 * extent(first)
-    kept = (heights.max(axis=1) > rounding) & (heights.min(axis=1) < -rounding)
-    # two planes that cut at the same line have proportional heights
-    key = heights[kept] / np.abs(heights[kept]).max(axis=1, keepdims=True)
-    key = key * np.sign(key[np.arange(len(key)), np.abs(key).argmax(axis=1)])[:, None] if len(key) else key
-    _, once = np.unique(np.round(key, 9), axis=0, return_index=True)
-    chosen = np.flatnonzero(kept)[np.sort(once)]
-    return list(zip(origins[chosen], normals[chosen]))
+            at, start, stop = corners[corner], edges[edge], edges[(edge + 1) % len(edges)]
+            is_target_edge = edges is second
+            ends = [_projected(at, end, first[0], normal, is_target_edge) for end in (start, stop)]
+            columns.append((start, np.cross(stop - start, at - start), *ends[0], *ends[1]))
+        nowhere = np.full((1, 3), np.nan)
+        columns.append((occluder[:1], unit_normal(occluder)[None], nowhere, np.array([True]), nowhere, np.array([False])))
+    start, across, p, is_p, q, is_q = (np.concatenate(part) for part in zip(*columns))
+    along = np.cross(across, normal)
+    lengths, widths = np.linalg.norm(along, axis=1), np.linalg.norm(across, axis=1)
+    kept = (lengths > 1e-12 * widths) & (widths > 0) & (is_p | is_q)
+    start, across, along = start[kept], across[kept] / widths[kept, None], along[kept] / lengths[kept, None]
+    a, b = (np.where(ok[kept], (point[kept] * along).sum(axis=1), np.nan) for point, ok in ((p, is_p), (q, is_q)))
+    is_whole = is_p[kept] & is_q[kept]
+    low, high = np.where(is_whole, np.minimum(a, b), -np.inf), np.where(is_whole, np.maximum(a, b), np.inf)
+    kinks = Kinks(start, across, along, low, high)
+    used = np.flatnonzero(kinks.evenness(first) > 1e-9)
+    return Kinks(*(getattr(kinks, name)[used] for name in Kinks.__slots__))
+
+
+def _projected(corners, ends, origin, normal, is_target_edge):
+    """Where lines from the target through the occluder meet the plane of the positions: points, and whether they do.
+
+    ``corners`` are the occluder's and ``ends`` the target's where ``is_target_edge``, else the other way round.
+    """
+    near, far = (corners, ends) if is_target_edge else (ends, corners)
+    height_near, height_far = (near - origin) @ normal, (far - origin) @ normal
+    meets = height_far > height_near
+    fall = np.where(meets, height_far - height_near, 1.0)
+    return far + (near - far) * (height_far / fall)[:, None], meets
 
 
 def _cut(cell, origin, normal):
@@ -236,10 +285,24 @@ def _cut(cell, origin, normal):
 
 def _halves(cell, kinks):
     """Cut a cell along the kink that divides it most evenly, else across its longest edge."""
-    if kinks:
-        heights = np.array([(cell - origin) @ normal for origin, normal in kinks])
-        evenness = np.minimum(heights.max(axis=1), -heights.min(axis=1)) / np.ptp(heights, axis=1).clip(1e-300)
+    if len(kinks):
+        evenness = kinks.evenness(cell)
         best = int(np.argmax(evenness))
-        if evenness[best] > 0.02:
-            return _cut(cell, *kinks[best])
+        if evenness[best] > 1e-3:
+            return _cut(cell, kinks.origins[best], kinks.normals[best])
     return [part for part in bisect(cell) if len(part) and fault_of(part) is None]
+
+
+def _cut_along_all(cell, kinks):
+    """Cells that no kink crosses."""
+    waiting, done = [cell], []
+    while waiting and len(waiting) + len(done) < CELLS_AT_ONCE:
+        cell = waiting.pop()
+        evenness = kinks.evenness(cell)
+        best = int(np.argmax(evenness))
+        parts = _cut(cell, kinks.origins[best], kinks.normals[best]) if evenness[best] > 1e-6 else [cell]
+        if len(parts) > 1:
+            waiting += parts
+        else:
+            done.append(cell)
+    return done + waiting
