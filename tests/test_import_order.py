@@ -13,8 +13,10 @@ ADDON = ROOT / "addon"
 MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "core": {"core"}}
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
-    *("settings", "scene", "textures", "emitters", "report", "workers", "kernel", "patches", "transport"),
-    *("solver", "receivers", "radiosity", "charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing"),
+    *("settings", "scene", "textures", "emitters", "report", "workers", "kernel", "patches"),
+    *("polygon", "quadrature", "lambert", "contour", "visibility", "analytic", "bodies", "closed_forms", "transport"),
+    *("estimators", "solver", "cases", "case_scene", "case_factors", "case_solutions", "shipped_cases", "verify"),
+    *( "receivers", "radiosity", "charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing"),
     *("gather", "lightmap", "bake"),
 )
 BLENDER = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "idprop"}

@@ -205,3 +205,17 @@ def summary(results, method: str, setting: str) -> str:
     return f"{method} ({setting}): {passed} of {len(results)} cases passed, {seconds:.1f} s"
 
 
+
+
+def report(results, method: str, setting: str) -> dict:
+    """All results for a file of JSON."""
+    covered = [r.covered for r in results if r.covered is not None]
+    return {
+        "method": method,
+        "setting": setting,
+        "passed": sum(r.passed for r in results),
+        "failed": sum(not r.passed for r in results),
+        "share_covered_by_stated_error": sum(covered) / max(len(covered), 1),
+        "seconds": sum(r.seconds for r in results),
+        "cases": [r.as_dict() for r in results],
+    }
