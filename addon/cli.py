@@ -223,9 +223,7 @@ def run_verify(args: argparse.Namespace) -> None:
     print(verify.HEADER)
     with Workers(args.threads or os.cpu_count() or 1) as workers:
         estimator = make_estimator(args.method, workers, args.seed)
-        results = verify.run_cases(
-            cases, estimator, args.method, lambda result: print(verify.row(result), flush=True)
-        )
+        results = verify.run_cases(cases, estimator, args.method, lambda result: print(verify.row(result), flush=True))
     print(verify.summary(results, args.method, estimator.setting))
     if args.report:
         report = verify.report(results, args.method, estimator.setting)

@@ -15,8 +15,18 @@ MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "
 CORE_ORDER = (
     *("settings", "scene", "textures", "emitters", "report", "workers", "kernel", "patches"),
     *("polygon", "quadrature", "lambert", "contour", "visibility", "analytic", "bodies", "closed_forms", "transport"),
-    *("estimators", "solver", "cases", "case_scene", "case_factors", "case_solutions", "shipped_cases", "verify"),
-    *( "receivers", "radiosity", "charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing"),
+    *(
+        "sampled",
+        "estimators",
+        "solver",
+        "cases",
+        "case_scene",
+        "case_factors",
+        "case_solutions",
+        "shipped_cases",
+        "verify",
+    ),
+    *("receivers", "radiosity", "charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing"),
     *("gather", "lightmap", "bake"),
 )
 BLENDER = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "idprop"}

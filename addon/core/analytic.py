@@ -251,8 +251,11 @@ def element_form_factor(point, normal, target: Surface, blockers=()) -> float:
         seen = _above_element(piece - point, normal)
         if seen is None or unit_normal(seen) @ seen[0] >= 0:
             continue
-        hiding = [above(part, seen) for part in (_above_element(o - point, normal) for s in blockers for o in s.pieces)
-                  if part is not None]
+        hiding = [
+            above(part, seen)
+            for part in (_above_element(o - point, normal) for s in blockers for o in s.pieces)
+            if part is not None
+        ]
         hiding = [part for part in hiding if len(part) and fault_of(part) is None]
         total += float(visible_factors(np.zeros((1, 3)), normal, seen, hiding)[0])
     return max(total, 0.0)

@@ -12,6 +12,8 @@ import numpy as np
 from .analytic import Surface, exchange, exchanges
 from .polygon import polygon_area
 
+PANEL_ERROR = 1e-3  # relative, of factors of flat panels for curved bodies: it falls with the square of their size
+
 
 @dataclass(frozen=True, slots=True)
 class Ring:

@@ -214,7 +214,10 @@ def concentric_spheres_case(case: Case, estimator) -> Estimate:
     names = [("inner", "1"), ("outer", "2")]
     parts = []
     for first, second in FACTOR.findall(case.quantity):
-        i, j = (next((k for k, words in enumerate(names) if any(w in name for w in words)), None) for name in (first, second))
+        i, j = (
+            next((k for k, words in enumerate(names) if any(w in name for w in words)), None)
+            for name in (first, second)
+        )
         if i is None or j is None:
             raise CaseError(f"F({first}->{second}) names neither inner nor outer")
         parts.append(at(found, (i, j)))

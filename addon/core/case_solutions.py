@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 
 import numpy as np
@@ -41,11 +42,18 @@ def furnace_case(case: Case, estimator) -> Estimate:
     emitted = case.number("E", 1 - rho)
     scene = scenes.case_scene(case)
     rooms = [list(scene.surfaces.values())] if scene.surfaces else []
-    rooms = rooms or [scenes.box((0, 0, 0), (1, 1, 1)), scenes.tetrahedron(), scenes.l_room()]
-    found = [
-        solve(estimator.matrix(room, scene.blockers).value, rho, emitted, _areas(room)) for room in rooms
-    ]
+    if not rooms:
+        found = [solve(factors, rho, emitted, areas) for factors, areas in _closed_rooms(estimator)]
+    else:
+        found = [solve(estimator.matrix(room, scene.blockers).value, rho, emitted, _areas(room)) for room in rooms]
     return solved(np.concatenate(found))
+
+
+@functools.lru_cache(maxsize=1)
+def _closed_rooms(estimator):
+    """Form factors and areas of three closed rooms, the same for every reflectance."""
+    rooms = (scenes.box((0, 0, 0), (1, 1, 1)), scenes.tetrahedron(), scenes.l_room())
+    return [(estimator.matrix(room).value, _areas(room)) for room in rooms]
 
 
 def faces_case(case: Case, estimator) -> Estimate:
@@ -188,7 +196,9 @@ def _with_floors(faces, floors):
     """The faces of a box, those that coincide with a given floor replaced by the part of the floor over them."""
     out = []
     for face in faces:
-        parts = [part for floor in floors for piece in floor.pieces for part in [_common(piece, face.pieces[0])] if len(part)]
+        parts = [
+            part for floor in floors for piece in floor.pieces for part in [_common(piece, face.pieces[0])] if len(part)
+        ]
         out.append(Surface(face.name, tuple(parts)) if parts else face)
     return out
 
@@ -307,5 +317,3 @@ def concentric_case(case: Case, estimator) -> Estimate:
     r1, r2 = case.number("r1", 1.0), case.number("r2", 2.0)
     found = concentric_matrix(r1, r2, estimator)
     return solved(solve(found.value, _pair(case, "rho"), _pair(case, "E"), np.array([r1**2, r2**2])))
-
-

@@ -186,9 +186,10 @@ def subtract(corners, hole) -> list[np.ndarray]:
 
 def are_coplanar(first, second) -> bool:
     """Whether two polygons lie in one plane, to rounding."""
-    return not heights_above(second, first[0], unit_normal(first)).any() and not heights_above(
-        first, second[0], unit_normal(second)
-    ).any()
+    return (
+        not heights_above(second, first[0], unit_normal(first)).any()
+        and not heights_above(first, second[0], unit_normal(second)).any()
+    )
 
 
 def bisect(corners):
@@ -199,3 +200,15 @@ def bisect(corners):
     positions = corners @ along
     heights = positions - 0.5 * (positions.min() + positions.max())
     return clip(corners, heights), clip(corners, -heights)
+
+
+def distance_to(point, corners) -> float:
+    """Distance from a point (3,) to a convex polygon (K, 3) [m]."""
+    normal = unit_normal(corners)
+    inward = np.cross(normal, np.roll(corners, -1, axis=0) - corners)
+    if (((point - corners) * inward).sum(axis=1) >= 0).all():
+        return abs(float((point - corners[0]) @ normal))
+    along = np.roll(corners, -1, axis=0) - corners
+    squared = np.maximum((along**2).sum(axis=1), 1e-300)
+    share = np.clip(((point - corners) * along).sum(axis=1) / squared, 0, 1)
+    return float(np.linalg.norm(corners + share[:, None] * along - point, axis=1).min())

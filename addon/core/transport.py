@@ -5,6 +5,7 @@ F[i, j] is the share of the power leaving side i that lands on side j; a row sum
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,7 +88,9 @@ def replicated(estimator, sides, reduce, first: int = 0):
     ``rows`` are float32 (K, 2 P); the randomisations are the estimator's seed + first, seed + first + 1, ...
     """
     seeds = range(estimator.seed + first, estimator.seed + first + REPLICATES)
-    return np.stack([reduce(replace(estimator, seed=seed).rows(sides)) for seed in seeds])
+    # each waits for the kernel's own workers: together they keep all of these busy, few sides alone do not
+    with ThreadPoolExecutor(REPLICATES) as pool:
+        return np.stack(list(pool.map(lambda seed: reduce(replace(estimator, seed=seed).rows(sides)), seeds)))
 
 
 def form_factors(kernel: KernelScene, method: str, error: float, seed: int):

@@ -12,7 +12,7 @@ import numpy as np
 from . import case_factors, case_solutions
 from .case_scene import case_scene
 from .cases import Case, CaseError, flat, tolerance_of
-from .estimators import SampledEstimator
+from .sampled import SampledEstimator
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ def _judge(found, case, tolerance):
         raise CaseError(f"{len(value)} numbers came out and the exact value has {len(exact)}")
     exact = np.broadcast_to(exact, len(value))
     error = np.abs(value - exact)
-    allowed = tolerance.allowed(exact, deviation)
+    allowed = tolerance.allowed(exact, deviation, bound)
     excess = np.where(np.isfinite(error), error - allowed, np.inf)
     worst = int(np.argmax(np.where(error == 0, -1.0, error / np.maximum(allowed, 1e-300))))
     covered = bool((error <= bound).all())
@@ -203,8 +203,6 @@ def summary(results, method: str, setting: str) -> str:
     passed = sum(r.passed for r in results)
     seconds = sum(r.seconds for r in results)
     return f"{method} ({setting}): {passed} of {len(results)} cases passed, {seconds:.1f} s"
-
-
 
 
 def report(results, method: str, setting: str) -> dict:

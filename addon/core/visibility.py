@@ -18,8 +18,8 @@ from .quadrature import fan, triangle_areas, triangle_rule
 COARSE, FINE = 3, 5  # nodes along a triangle's side; the difference is the error of a cell
 KINKS_AT_ONCE, CELLS_AT_ONCE = 200, 400  # with no more kinks than this, cells are cut along all of them at the start
 GENERATIONS = 14
-CELL_LIMIT = 20000
-HIDDEN_ERROR = 1e-7  # of the unobstructed exchange, to which the hidden part is integrated
+CELL_LIMIT = 1500
+HIDDEN_ERROR = 1e-6  # of the unobstructed exchange, to which the hidden part is integrated
 VISIBLE_ERROR = 1e-5  # of a small visible part
 NOTHING = 1e-12  # of the unobstructed exchange: a visible part below this is rounding
 
@@ -149,7 +149,9 @@ def clip_all(polygons, heights):
     both = both.reshape(len(polygons), 2 * polygons.shape[1], 3)
     counts = kept.sum(axis=1)
     order = np.argsort(~kept, axis=1, kind="stable")[:, : max(counts.max(initial=3), 3)]
-    order = np.where(np.arange(order.shape[1]) < counts[:, None], order, order[np.arange(len(order)), counts - 1][:, None])
+    order = np.where(
+        np.arange(order.shape[1]) < counts[:, None], order, order[np.arange(len(order)), counts - 1][:, None]
+    )
     return np.take_along_axis(both, order[..., None], axis=1), is_left
 
 
@@ -251,7 +253,9 @@ def _kinks(first, second, occluders) -> Kinks:
             ends = [_projected(at, end, first[0], normal, is_target_edge) for end in (start, stop)]
             columns.append((start, np.cross(stop - start, at - start), *ends[0], *ends[1]))
         nowhere = np.full((1, 3), np.nan)
-        columns.append((occluder[:1], unit_normal(occluder)[None], nowhere, np.array([True]), nowhere, np.array([False])))
+        columns.append(
+            (occluder[:1], unit_normal(occluder)[None], nowhere, np.array([True]), nowhere, np.array([False]))
+        )
     start, across, p, is_p, q, is_q = (np.concatenate(part) for part in zip(*columns))
     along = np.cross(across, normal)
     lengths, widths = np.linalg.norm(along, axis=1), np.linalg.norm(across, axis=1)
