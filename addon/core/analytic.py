@@ -1,8 +1,8 @@
 """Analytic form factors between planar polygons: each pair by the formula that holds for it.
 
 Far apart: Gauss on both polygons, all terms positive. Near or touching: the double contour integral. Where that would
-lose digits (slivers, small things, angles near 180 degrees): parts, each far or near. Partly hidden: what others hide is integrated
-over positions and taken off. The exchange A_i F_ij of a pair is computed once, so reciprocity is exact.
+lose digits (slivers, small things, angles near 180 degrees): parts, each far or near. Partly hidden: what others hide
+is integrated over positions and taken off. The exchange A_i F_ij of a pair is computed once, so reciprocity is exact.
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ def without(whole: Surface, hole: Surface) -> Surface:
 
 
 def cut_overlaps(surfaces):
-    """Surfaces of which none covers another: of coplanar ones that face the same way, the smaller keeps what they share.
+    """Surfaces of which none covers another: of coplanar ones that face one way, the smaller keeps what both cover.
 
-    A lamp in a ceiling is smaller than the ceiling; of duplicates the first keeps all, the others are left without pieces.
+    A lamp in a ceiling is smaller than the ceiling; of duplicates the first keeps all, the others have no pieces left.
     """
     kept: dict[int, Surface] = {}
     areas = [one.area for one in surfaces]
@@ -229,7 +229,7 @@ def surface_exchange(first: Surface, second: Surface, blockers=()) -> float:
 
 
 def exchange_matrix(surfaces, blockers=()):
-    """A_i F_ij of all pairs, symmetric, float64 (N, N) [m^2]; every surface blocks the others, ``blockers`` add to them."""
+    """A_i F_ij of all pairs, symmetric, float64 (N, N) [m^2]; surfaces block each other, ``blockers`` block, too."""
     exchanges = np.zeros((len(surfaces), len(surfaces)))
     for i, first in enumerate(surfaces):
         for j in range(i):

@@ -5,6 +5,7 @@ A ring is one panel and how many times it goes around; by symmetry one panel sta
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,7 +70,7 @@ def disk(name: str, radius: float, height: float, sides: int, looks_up: bool) ->
 def cylinder(name: str, radius: float, low: float, high: float, sides: int, rings: int, looks_in: bool = True) -> Body:
     """The side of a cylinder from z = ``low`` to ``high`` [m] in ``rings`` rings."""
     heights = np.linspace(low, high, rings + 1)
-    return Body(name, tuple(_ring((radius, a), (radius, b), sides, looks_in) for a, b in zip(heights, heights[1:])))
+    return Body(name, tuple(_ring((radius, a), (radius, b), sides, looks_in) for a, b in itertools.pairwise(heights)))
 
 
 def sphere(name: str, radius: float, polar_angles, sides: int, looks_in: bool, centre: float = 0.0) -> Body:

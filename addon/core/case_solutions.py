@@ -37,7 +37,7 @@ def _areas(surfaces):
 
 
 def furnace_case(case: Case, estimator) -> Estimate:
-    """``B everywhere`` with E and rho the same on all faces: in the case's own room, or a cube, a tetrahedron, an L-room."""
+    """``B everywhere``, E and rho the same on all faces: in the case's own room, or cube, tetrahedron, L-room."""
     rho = case.number("rho")
     emitted = case.number("E", 1 - rho)
     scene = scenes.case_scene(case)
@@ -265,7 +265,7 @@ def lit_cap_case(case: Case, estimator) -> Estimate:
 
 
 def cavity_case(case: Case, estimator) -> Estimate:
-    """Sphere with a cap of area fraction f removed, E = 1 - rho: B of the wall, escaped over emitted power, emissivity."""
+    """Sphere without a cap of area fraction f, E = 1 - rho: B of the wall, escaped over emitted power, emissivity."""
     f, rho = case.number("f"), case.number("rho")
     emitted = case.number("E", 1 - rho)
     wall, opening = _sphere_with_port(1.0, f, 0.0, True)

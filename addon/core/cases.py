@@ -1,8 +1,8 @@
 """Exact cases: what a file of them says, and what its tolerance classes allow.
 
-The schema: ``{"schema": "exact_cases/1", "tolerance_classes": {...}, "cases": [...]}``; a case has an id, a quantity in words
-such as ``F(A->B)``, its exact value (a number, or lists or an object of numbers), a tolerance class, params, and a
-geometry of named polygons: ``surfaces``, ``occluders``, and others that only block.
+The schema: ``{"schema": "exact_cases/1", "cases": [...]}``; a case has an id, a quantity in words such as ``F(A->B)``,
+its exact value (a number, or lists or an object of numbers), a tolerance class, params, and a geometry of named
+polygons: ``surfaces``, ``occluders``, and others that only block.
 """
 
 from __future__ import annotations

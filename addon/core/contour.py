@@ -1,8 +1,8 @@
 """The double contour integral of form factors between polygons that see each other whole.
 
-A_1 F_12 = 1 / (2 pi) contour_1 contour_2 ln r dr_1 . dr_2 (Sparrow 1963, eq. 20; Moon 1936). The inner integral is closed;
-parallel edges are closed altogether; of skew edges the outer integral is by Gauss on panels that shrink towards
-the places where the integrand is singular, which are known: the feet of the other edge's ends and the point
+A_1 F_12 = 1 / (2 pi) contour_1 contour_2 ln r dr_1 . dr_2 (Moon 1936; Sparrow 1963). The inner integral is closed;
+parallel edges are closed altogether; of skew edges the outer integral is by Gauss on panels that shrink towards the
+places where the integrand is singular, which are known: the feet of the other edge's ends and the point
 where the two lines are nearest.
 """
 
@@ -74,7 +74,7 @@ def _parallel(p, u, m, q, cosine, n, scale):
 
 
 def _second_primitive(t, height, scale):
-    """G(t) with G'' = ln(sqrt(t^2 + h^2) / scale), up to what cancels around contours (terms linear in t, constants)."""
+    """G(t) with G'' = ln(sqrt(t^2 + h^2) / scale), up to what cancels around contours: constants, terms linear in t."""
     squared = t * t + height * height
     logarithm = 0.5 * np.log(np.where(squared > 0, squared, 1.0) / scale**2)
     angle = np.arctan2(t, height)

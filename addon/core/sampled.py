@@ -25,7 +25,7 @@ CLOSE_PARTS = 16  # into which a surface is cut, about, where something is near
 CLOSE = 5.0  # distance in sizes below which one hemicube cannot stand for a part
 PARTS_LIMIT = 512
 WHOLE_PIECES = 8  # a surface of more pieces is not cut: its pieces are small already
-MATRIX_RAYS = 1 << 22  # of a row of a matrix; its errors average out in a solution
+MATRIX_RAYS = 1 << 20  # of a row of a matrix; its errors average out in a solution
 FIRST_RAYS = 1 << 18  # of all replicates together
 HEMICUBE_BIAS = 0.1  # of 1 / resolution^2, relative: midpoints of pixels, turned at random and from many positions
 
@@ -70,7 +70,7 @@ class SampledEstimator:
     def element(self, point, normal, target: Surface, blockers=()) -> Estimate:
         """F from an element to target among blockers: a triangle so small that F is the same all over it."""
         near = min(distance_to(point, piece) for piece in target.pieces)
-        return self.factor(Surface("dA", (_triangle_at(point, normal, 3e-3 * nearest),)), target, blockers)
+        return self.factor(Surface("dA", (_triangle_at(point, normal, 1e-5 * near),)), target, blockers)
 
     def matrix(self, surfaces, blockers=()) -> Estimate:
         """F of all pairs, float64 (N, N); what is much smaller than the emitter by reciprocity from its own side."""

@@ -1,4 +1,4 @@
-"""The cases that `patchlight verify` runs without a file: made here, from closed forms and laws, each with its source."""
+"""The cases that `patchlight verify` runs without a file: from closed forms and laws, each with its source."""
 
 from __future__ import annotations
 
@@ -70,13 +70,15 @@ def _perpendicular():
 
 def _points():
     for a, b, c in ((1, 1, 1), (2, 0.5, 1), (10, 10, 1)):
-        yield _entry(f"element_under_corner_{a}x{b}_at_{c}", "F(dA->B)", forms.element_under_corner(a, b, c), "Howell B-4",
-                     "POINT", {"B": _down((0, a), (0, b), c)}, params={"point": [0, 0, 0], "normal": [0, 0, 1]})  # fmt: skip
+        where = {"point": [0, 0, 0], "normal": [0, 0, 1]}
+        yield _entry(f"element_under_corner_{a}x{b}_at_{c}", "F(dA->B)", forms.element_under_corner(a, b, c),
+                     "Howell B-4", "POINT", {"B": _down((0, a), (0, b), c)}, params=where)  # fmt: skip
     half = {"edge": _up((-100, 0), (-100, 100), 1)}
     lamp = {"lamp": _down((-0.5, 0.5), (-0.5, 0.5), 2)}
-    yield _entry("penumbra_middle", "irradiance at floor points (x,0,0), lamp B=1", [0.0, 2 * forms.element_under_corner(
-        0.5, 0.5, 2)], "half the lamp is seen under its middle, nothing 1 m further; Howell B-4", "POINT", lamp, half,
-        {"x": [-1, 0]})  # fmt: skip
+    seen = 2 * forms.element_under_corner(0.5, 0.5, 2)
+    yield _entry("penumbra_middle", "irradiance at floor points (x,0,0), lamp B=1", [0.0, seen],
+                 "half the lamp is seen under its middle, nothing 1 m further; Howell B-4", "POINT", lamp, half,
+                 {"x": [-1, 0]})  # fmt: skip
 
 
 # ---- bodies ----
@@ -88,12 +90,14 @@ def _curved():
                      "FF-CURVED", params={"r1": r1, "r2": r2, "h": h})  # fmt: skip
     disk = forms.coaxial_disks(1, 1, 1.5)
     side = (1 - disk) / 3
-    yield _entry("cylinder", "F(disk->disk),F(disk->side),F(side->disk),F(side->side)", [disk, 1 - disk, side, 1 - 2 * side],
-                 "Howell C-41, closure, reciprocity", "FF-CURVED", params={"r": 1, "h": 1.5})  # fmt: skip
+    quantity, values = "F(disk->disk),F(disk->side),F(side->disk),F(side->side)", [disk, 1 - disk, side, 1 - 2 * side]
+    yield _entry(
+        "cylinder", quantity, values, "Howell C-41, closure, reciprocity", "FF-CURVED", params={"r": 1, "h": 1.5}
+    )
     yield _entry("hemisphere", "F(base disk->hemisphere), F(hemi->base), F(hemi->hemi)", [1.0, 0.5, 0.5],
                  "closure, reciprocity", "FF-CURVED", params={"R": 1})  # fmt: skip
     yield _entry("sphere_inside", "F_ij = A_j/(4 pi R^2) for any two parts of a sphere", 1.0,
-                 "cos cos / (pi r^2) = 1 / (4 pi R^2) between any two points", "FF-CURVED", params={"R": 1})  # fmt: skip
+                 "cos cos / (pi r^2) = 1 / (4 pi R^2) for any two points", "FF-CURVED", params={"R": 1})  # fmt: skip
 
 
 def _matrices():
@@ -134,9 +138,9 @@ def _occluded():
     yield _entry("all_hidden", "F(A->B)", 0.0, "a plate larger than both", "EXACT-ZERO", plates,
                  {"O": _up((-1, 2), (-1, 2), 0.5)})  # fmt: skip
     share = 1 / 4
-    yield _entry("nested_cubes", "F(outer face->inner cube all faces), F(inner face->outer all), F(outer face->outer rest)",
-                 [share, 1.0, 1 - share], "convex body in a closed one, symmetry", "FF-OCCLUDED",
-                 params={"L": 2, "s": 1})  # fmt: skip
+    quantity = "F(outer face->inner cube all faces), F(inner face->outer all), F(outer face->outer rest)"
+    yield _entry("nested_cubes", quantity, [share, 1.0, 1 - share], "convex body in a closed one, symmetry",
+                 "FF-OCCLUDED", params={"L": 2, "s": 1})  # fmt: skip
 
 
 def _hard():
@@ -162,8 +166,8 @@ def _robust():
                  {"A": below, "B1": above, "B2": above})  # fmt: skip
     bad = {"point": [(0.5, 0.5, 0.5)] * 3, "line": [(0, 0, 0.5), (0.5, 0, 0.5), (1, 0, 0.5)],
            "not finite": [(0, 0, 0.5), (None, 0, 0.5), (0, 1, 0.5)]}  # fmt: skip
-    yield _entry("degenerate_blockers", "F(A->B)", clear, "faces without an area change nothing; Howell C-11", "FF-SMOOTH",
-                 {"A": below, "B": above}, bad)  # fmt: skip
+    yield _entry("degenerate_blockers", "F(A->B)", clear, "faces without an area change nothing; Howell C-11",
+                 "FF-SMOOTH", {"A": below, "B": above}, bad)  # fmt: skip
     yield _entry("no_reflectance", "B-E", 0.0, "rho = 0", "INVARIANT")
 
 
@@ -177,8 +181,9 @@ def _solutions():
     yield _entry("cube_mean", "B per face, order as cube", _lit_cube(0.8), "Howell C-11, symmetry", "SOLUTION",
                  params={"rho": [0.8] * 6, "E": [1, 0, 0, 0, 0, 0]})  # fmt: skip
     zones = [[0.1, 0.2, 1.0], [0.4, 0.6, 0.0], [0.5, 0.8, 0.5]]
-    yield _entry("sphere_zones", "irradiance H (uniform), then B per zone", forms.integrating_sphere(*np.transpose(zones)),
-                 "integrating sphere", "SOLUTION-CURVED", params={"zones_areafraction_rho_E": zones})  # fmt: skip
+    values = forms.integrating_sphere(*np.transpose(zones))
+    yield _entry("sphere_zones", "irradiance H (uniform), then B per zone", values, "integrating sphere",
+                 "SOLUTION-CURVED", params={"zones_areafraction_rho_E": zones})  # fmt: skip
     share = 0.25
     spheres = forms.two_surfaces(((0, 1), (share, 1 - share)), (0.5, 0.8), (1, 0))
     yield _entry("concentric_spheres", "B inner, B outer", spheres, "convex body in a closed one, r1=1, r2=2",
@@ -186,7 +191,8 @@ def _solutions():
     f1, f2 = 1e-4, 1e-3
     port = forms.two_surfaces(((1 - f1, f1), (f2, 1 - f2)), (0.7, 0.6), (1, 0))
     yield _entry("two_spheres", "B1,B2,B2/B1", [*port, port[1] / port[0]], "a circular port shared by two spheres",
-                 "SOLUTION-CURVED", params={"f1": f1, "f2": f2, "rho1": 0.7, "rho2": 0.6, "E1": 1, "E2": 0})  # fmt: skip
+                 "SOLUTION-CURVED",
+                 params={"f1": f1, "f2": f2, "rho1": 0.7, "rho2": 0.6, "E1": 1, "E2": 0})  # fmt: skip
 
 
 def _lit_cube(rho):

@@ -166,7 +166,7 @@ def integrate_partly_hidden(first, second, occluders) -> PartlyHidden:
     normal = unit_normal(first)
     for generation in range(GENERATIONS):
         visible, total, errors = _cell_integrals(cells, normal, second, occluders)
-        sums = done[:2] + (visible.sum(), total.sum())
+        sums = done[:2] + np.array([visible.sum(), total.sum()])
         seen, hidden = sums[0], sums[1] - sums[0]
         allowed = HIDDEN_ERROR * sums[1] if hidden < seen else max(VISIBLE_ERROR * seen, 1e-3 * HIDDEN_ERROR * sums[1])
         error = errors[:, int(hidden < seen)]

@@ -120,7 +120,7 @@ def test_disks_are_howells_c41(r):
 def test_points_against_the_slow_formula():
     rng = np.random.default_rng(3)
     for _ in range(20):
-        target = rng.normal(size=(3, 3)) + (0, 0, 0.5)
+        target = rng.normal(size=(3, 3)) + np.array([0, 0, 0.5])
         facing = target if np.cross(target[1] - target[0], target[2] - target[0]) @ target[0] < 0 else target[::-1]
         expected = point_to_polygon(np.zeros(3), np.array([0, 0, 1.0]), facing)
         found = element_form_factor(np.zeros(3), np.array([0, 0, 1.0]), surface("B", facing))

@@ -35,7 +35,7 @@ def c41(r1, r2, h):
 
 
 def crossed_strings(angle):
-    """Between two unit strips of infinite length that share an edge at this angle [rad]: 1 - sin(angle / 2) (Hottel)."""
+    """Between two infinite strips of unit width that share an edge at this angle [rad]: 1 - sin(angle / 2) (Hottel)."""
     return 1 - np.sin(angle / 2)
 
 
