@@ -27,7 +27,9 @@ PARTS_LIMIT = 512
 WHOLE_PIECES = 8  # a surface of more pieces is not cut: its pieces are small already
 MATRIX_RAYS = 1 << 20  # of a row of a matrix; its errors average out in a solution
 FIRST_RAYS = 1 << 18  # of all replicates together
-HEMICUBE_BIAS = 0.1  # of 1 / resolution^2, relative: midpoints of pixels, turned at random and from many positions
+NEAR_BIAS = 10.0  # of 1 / resolution^4, relative: what is left of the pixels' midpoints after extrapolation
+FAR_BIAS = 0.5  # of a pixel's delta form factor: far away, all hemicubes see the target through the same pixels
+FAR_RESOLUTION = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,7 @@ class SampledEstimator:
     workers : threads
     wanted : bound of the error at which it stops
     ray_limit : rays of one row, all replicates together
-    resolution : pixels along a hemicube's top face
+    resolution : pixels along a hemicube's top face, near; half of them, too, to extrapolate to none
     seed : int
     """
 
@@ -48,13 +50,17 @@ class SampledEstimator:
     workers: Workers
     wanted: float = 3e-4
     ray_limit: int = 1 << 25
-    resolution: int = 32
+    resolution: int = 24
     seed: int = 0
 
     @property
     def setting(self) -> str:
         """What is the same for every case, in words."""
-        how = f"hemicubes of {self.resolution}^2 pixels at several positions, " if self.name == "hemicube" else ""
+        how = (
+            f"hemicubes of {self.resolution}^2 and half as fine near, {FAR_RESOLUTION}^2 far, "
+            if self.name == "hemicube"
+            else ""
+        )
         limit = self.ray_limit.bit_length() - 1
         return f"{how}{REPLICATES} replicates, rays until the 99 % bound is {self.wanted:g}, at most 2^{limit}"
 
@@ -99,26 +105,42 @@ class SampledEstimator:
         scenes = [_PartScene(part, len(parts) == 1, emitter, others, own, self.workers) for part in parts]
         weights = np.array([_area(part) for part in parts]) / emitter.area
         bias = min(1.0, sum(w * min(1.0, part_push(p, others)) for w, part in zip(weights, parts) for p in part[:1]))
-        bias += HEMICUBE_BIAS / self.resolution**2 if self.name == "hemicube" else 0.0
+        is_near = len(parts) > 1
         spent, turn = FIRST_RAYS // REPLICATES, 0
         while True:
             replicates, rays = 0.0, 0
             for k, (weight, scene) in enumerate(zip(weights, scenes)):
-                estimator = self._estimator(scene.kernel, max(1, spent // (len(parts) * len(scene.sides))))
-                replicates = replicates + weight * replicated(
-                    # parts must not share a sequence: their errors would add up
-                    estimator, scene.sides, scene.reduce, first=REPLICATES * (turn * len(parts) + k)
-                )  # fmt: skip
-                rays += REPLICATES * len(scene.sides) * estimator.rays_per_row
+                # parts must not share a sequence: their errors would add up
+                first, share = REPLICATES * (turn * len(parts) + k), max(1, spent // (len(parts) * len(scene.sides)))
+                found, traced = self._replicates(scene, share, first, is_near)
+                replicates, rays = replicates + weight * found, rays + traced
             if estimate(replicates, rays).bound.max() <= wanted or 4 * rays > self.ray_limit:
-                return estimate(replicates, rays, bias)
+                return self._with_bias(estimate(replicates, rays, bias), is_near)
             spent, turn = 4 * spent, turn + 1
 
-    def _estimator(self, kernel, rays):
-        if self.name == "hemicube":
+    def _replicates(self, scene, rays, first, is_near):
+        """Factors of a part (REPLICATES, N), and the rays traced for them, ``rays`` or more from each of its sides."""
+        if self.name == "monte-carlo":
+            chosen = [(1.0, MonteCarloFormFactors(scene.kernel, 1 << (rays - 1).bit_length(), self.seed))]
+        else:
             positions = max(1, round(rays / (3 * self.resolution**2)))
-            return HemicubeFormFactors(kernel, self.resolution, positions, self.seed)
-        return MonteCarloFormFactors(kernel, 1 << (rays - 1).bit_length(), self.seed)
+            fine = HemicubeFormFactors(scene.kernel, FAR_RESOLUTION, positions, self.seed)
+            chosen = [(1.0, fine)]
+            if is_near:
+                # midpoints of pixels are off by the square of their size, evened out over positions (Richardson)
+                near = [replace(fine, resolution=size) for size in (self.resolution, self.resolution // 2)]
+                chosen = list(zip((4 / 3, -1 / 3), near))
+        found = sum(w * replicated(one, scene.sides, scene.reduce, first) for w, one in chosen)
+        return found, REPLICATES * len(scene.sides) * sum(one.rays_per_row for _, one in chosen)
+
+    def _with_bias(self, found: Estimate, is_near) -> Estimate:
+        if self.name == "monte-carlo":
+            return found
+        if is_near:
+            return replace(found, bound=found.bound + NEAR_BIAS / self.resolution**4 * np.abs(found.value))
+        # the middle pixels of the top face: the largest there are
+        pixel = (2 / FAR_RESOLUTION) ** 2 / np.pi
+        return replace(found, bound=found.bound + FAR_BIAS * pixel + np.abs(found.value) / FAR_RESOLUTION**2)
 
 
 def _area(part):

@@ -116,7 +116,7 @@ HANDLERS: tuple[tuple[Callable[[Case], bool], Handler], ...] = (
      case_solutions.plates_case),
 )  # fmt: skip
 
-# at which a sampled factor stops, where a class asks for more than the estimator's own
+# at which a sampled factor stops, with eight times the rays, where a class asks for more than the estimator's own
 WANTED = {"FF-TOUCHING": 1e-4}
 
 
@@ -129,7 +129,9 @@ def run_case(case: Case, estimator, method: str) -> CaseResult:
         if handler is None:
             raise CaseError("the quantity is not understood")
         if isinstance(estimator, SampledEstimator):
-            estimator = replace(estimator, wanted=WANTED.get(case.tolerance_class, estimator.wanted))
+            wanted = WANTED.get(case.tolerance_class, estimator.wanted)
+            more = 8 if wanted < estimator.wanted else 1
+            estimator = replace(estimator, wanted=wanted, ray_limit=more * estimator.ray_limit)
         found = handler(case, estimator)
         judged = _judge(found, case, tolerance)
     except CaseError as error:
