@@ -13,8 +13,14 @@ from .cases import Case, CaseError
 from .transport import Estimate
 
 FACTOR = re.compile(r"F\(([^()]*?)->([^()]*?)\)")
+BY_NUMBERS = re.compile(r"\bF_?(\d)_?(\d)\b")
 SPHERE_PARTS = 3
 ALL_FACES = re.compile(r"\ball\b|\brest\b")
+
+
+def factors_in(quantity: str) -> list[tuple[str, str]]:
+    """The pairs of names that a quantity asks factors of; ``F12`` is ``F(1->2)``."""
+    return FACTOR.findall(BY_NUMBERS.sub(r"F(\1->\2)", quantity))
 
 
 def combine(parts, weights=None) -> Estimate:
@@ -46,7 +52,7 @@ def element_case(case: Case, estimator) -> Estimate:
         raise CaseError("point and normal must be three numbers each")
     normal = normal / np.linalg.norm(normal)
     parts = []
-    for _, name in FACTOR.findall(case.quantity):
+    for _, name in factors_in(case.quantity):
         target = scene.named(name.strip())
         parts.append(estimator.element(point, normal, target, scene.others(target)))
     return _summed_or_listed(case.quantity, parts)
@@ -84,7 +90,7 @@ def polygons_case(case: Case, estimator) -> Estimate:
     """``F(A->B)`` between named surfaces; joined by + a sum, by commas a list; all others block."""
     scene = scenes.case_scene(case)
     parts = []
-    for first, second in FACTOR.findall(case.quantity):
+    for first, second in factors_in(case.quantity):
         emitter, target = scene.named(first.strip()), scene.named(second.strip())
         parts.append(estimator.factor(emitter, target, scene.others(emitter, target)))
     return _summed_or_listed(case.quantity, parts)
@@ -127,7 +133,7 @@ def nested_boxes_case(case: Case, estimator) -> Estimate:
     faces = {"outer": scenes.box(-outer, outer), "inner": scenes.box(-inner, inner, looks_in=False)}
     everything = faces["outer"] + faces["inner"]
     parts = []
-    for first, second in FACTOR.findall(case.quantity):
+    for first, second in factors_in(case.quantity):
         emitter = faces[_which(first, faces)][0]
         targets = [s for s in faces[_which(second, faces)] if s is not emitter]
         targets = targets if ALL_FACES.search(second) else targets[:1]
@@ -168,7 +174,7 @@ def hemisphere_case(case: Case, estimator) -> Estimate:
 def _between_bodies(case, bodies, estimator):
     found = estimator.body_matrix(bodies)
     parts = []
-    for first, second in FACTOR.findall(case.quantity):
+    for first, second in factors_in(case.quantity):
         i = _body_index(first, bodies)
         j = _body_index(second, bodies)
         # "disk -> disk" means the other one: a flat disk does not see itself
@@ -213,7 +219,7 @@ def concentric_spheres_case(case: Case, estimator) -> Estimate:
     found = concentric_matrix(case.number("r1"), case.number("r2"), estimator)
     names = [("inner", "1"), ("outer", "2")]
     parts = []
-    for first, second in FACTOR.findall(case.quantity):
+    for first, second in factors_in(case.quantity):
         i, j = (
             next((k for k, words in enumerate(names) if any(w in name for w in words)), None)
             for name in (first, second)

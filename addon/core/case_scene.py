@@ -140,5 +140,5 @@ def zone_angles(shares, rings: int = SPHERE_RINGS):
     Returns a list of float64 (n + 1,) [rad], one for each zone.
     """
     borders = np.arccos(np.clip(1 - 2 * np.concatenate([[0], np.cumsum(shares)]), -1, 1))
-    count = [max(1, round(rings * (b - a) / np.pi)) for a, b in itertools.pairwise(borders)]
+    count = [max(4, round(rings * (b - a) / np.pi)) for a, b in itertools.pairwise(borders)]
     return [np.linspace(a, b, n + 1) for a, b, n in zip(borders, borders[1:], count)]

@@ -8,7 +8,7 @@ import re
 import numpy as np
 
 from . import case_scene as scenes
-from .analytic import Surface, cut_overlaps, surface, without
+from .analytic import Surface, cut_overlaps, exchanges, surface, without
 from .bodies import Body, Ring, disk, sphere
 from .case_factors import concentric_matrix
 from .cases import NUMBER, Case, CaseError
@@ -41,12 +41,14 @@ def furnace_case(case: Case, estimator) -> Estimate:
     rho = case.number("rho")
     emitted = case.number("E", 1 - rho)
     scene = scenes.case_scene(case)
-    rooms = [list(scene.surfaces.values())] if scene.surfaces else []
-    if not rooms:
-        found = [solve(factors, rho, emitted, areas) for factors, areas in _closed_rooms(estimator)]
+    if scene.surfaces:
+        # what stands in a furnace glows like its walls, on both sides
+        backs = [Surface(s.name, tuple(piece[::-1] for piece in s.pieces)) for s in scene.blockers]
+        room = [*scene.surfaces.values(), *scene.blockers, *backs]
+        rooms = [(estimator.matrix(room).value, _areas(room))]
     else:
-        found = [solve(estimator.matrix(room, scene.blockers).value, rho, emitted, _areas(room)) for room in rooms]
-    return solved(np.concatenate(found))
+        rooms = _closed_rooms(estimator)
+    return solved(np.concatenate([solve(factors, rho, emitted, areas) for factors, areas in rooms]))
 
 
 @functools.lru_cache(maxsize=1)
@@ -317,3 +319,39 @@ def concentric_case(case: Case, estimator) -> Estimate:
     r1, r2 = case.number("r1", 1.0), case.number("r2", 2.0)
     found = concentric_matrix(r1, r2, estimator)
     return solved(solve(found.value, _pair(case, "rho"), _pair(case, "E"), np.array([r1**2, r2**2])))
+
+
+# ---- the limit of fine elements ----
+
+
+def continuum_case(case: Case, estimator) -> Estimate:
+    """Mean B of the faces of a cube, one of them lit, in the limit of small elements: of three sizes by Aitken's rule.
+
+    In the order lit, opposite, around (once, or for each face).
+    """
+    rho, emitted = case.number("rho"), case.number("E", 1.0)
+    coarse, middle, fine = (_cube_means(count, rho, emitted, estimator) for count in (2, 4, 8))
+    step, next_step = middle - coarse, fine - middle
+    limit = fine - next_step**2 / (next_step - step)
+    return solved(limit[[0, 1, *[2] * (np.size(case.exact) - 2)]])
+
+
+def _cube_means(count, rho, emitted, estimator):
+    cells = [cell for face in scenes.box((0, 0, 0), (1, 1, 1)) for cell in _grid(face.pieces[0], count)]
+    if estimator.name != "analytic":
+        raise CaseError("the limit of small elements is left to the analytic method")
+    panels, face = np.array(cells), np.repeat(np.arange(6), count * count)
+    area = 1 / count**2
+    factors = np.zeros((len(panels), len(panels)))
+    for k, panel in enumerate(panels):
+        others = np.flatnonzero(face != face[k])
+        factors[k, others] = exchanges(panel, panels[others]) / area
+    radiosity = solve(factors, rho, np.where(face == 0, emitted, 0.0), np.full(len(panels), area))
+    means = radiosity.reshape(6, -1).mean(axis=1)
+    return np.array([means[0], means[1], means[2:].mean()])
+
+
+def _grid(corners, count):
+    a, b, _, d = corners
+    u, v = (b - a) / count, (d - a) / count
+    return [a + i * u + j * v + np.array([0 * u, u, u + v, v]) for i in range(count) for j in range(count)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -173,7 +173,15 @@ def parse_cases(entries, name: str) -> list[Case]:
     """Cases from the entries of a list; ``name`` stands in messages."""
     if not entries:
         raise CaseError(f"{name} holds no case")
-    return [_case(entry, f"{name}, case {number + 1}") for number, entry in enumerate(entries)]
+    cases = [_case(entry, f"{name}, case {number + 1}") for number, entry in enumerate(entries)]
+    rooms = {case.id: case.surfaces for case in cases if case.surfaces}
+    return [case if case.surfaces else replace(case, surfaces=_surfaces_as(case, rooms)) for case in cases]
+
+
+def _surfaces_as(case, rooms):
+    """The surfaces of the case that a quantity refers to by "as ID"; none where there is no such case."""
+    named = re.search(r"\bas ([\w.+-]+)", case.quantity)
+    return rooms.get(named.group(1), {}) if named else {}
 
 
 def _case(entry, where):

@@ -80,12 +80,12 @@ def _has(case, name):
 
 
 def _names_surfaces(case):
-    found = case_factors.FACTOR.findall(case.quantity)
+    found = case_factors.factors_in(case.quantity)
     return bool(found) and all(name.strip() in case.surfaces for pair in found for name in pair)
 
 
 def _names_element(case):
-    found = case_factors.FACTOR.findall(case.quantity)
+    found = case_factors.factors_in(case.quantity)
     return bool(found) and all(first.strip() == "dA" for first, _ in found)
 
 
@@ -98,9 +98,11 @@ HANDLERS: tuple[tuple[Callable[[Case], bool], Handler], ...] = (
     (_says(r"f\(.*disk.*side|f\(.*side", params=("r", "h")), case_factors.cylinder_case),
     (_says(r"f\(.*hemi"), case_factors.hemisphere_case),
     (_says(r"f\(.*inner|f\(.*outer", params=("L", "s")), case_factors.nested_boxes_case),
-    (_says(r"f\(.*inner|f\(.*outer|f\([12]->[12]\)", params=("r1", "r2")), case_factors.concentric_spheres_case),
+    (_says(r"f\(.*inner|f\(.*outer|f\([12]->[12]\)|\bf_?[12]_?[12]\b", params=("r1", "r2")),
+     case_factors.concentric_spheres_case),
     (_says(r"f_ij.*sphere"), case_factors.sphere_interior_case),
     (_says(r"^irradiance at"), case_factors.irradiance_case),
+    (lambda case: "continuum" in case.id + case.quantity and "cube" in case.id, case_solutions.continuum_case),
     (_says(r"^b everywhere"), case_solutions.furnace_case),
     (_says(r"^b per face", params=("rho", "E")), case_solutions.faces_case),
     (_says(r"^b\s*-\s*e$"), case_solutions.zero_albedo_case),

@@ -79,7 +79,12 @@ def test_long_hinged_strips_are_hottels_crossed_strings(degrees):
     assert found == pytest.approx(howell.crossed_strings(angle), rel=1e-2)
 
 
-@pytest.mark.parametrize("degrees", [0.01, 1, 45, 135, 179, 179.9])
+def test_nearly_flat_hinges_go_with_the_square_of_what_is_missing():
+    # F(pi - e) = c e^2 (1 + O(e^2)): e = 0.1 and 1 degrees, (1 degree)^2 = 3e-4
+    assert factor(*hinged(np.radians(179.9))) == pytest.approx(0.01 * factor(*hinged(np.radians(179))), rel=3e-4)
+
+
+@pytest.mark.parametrize("degrees", [0.01, 1, 45, 135, 179])
 def test_hinged_squares_are_additive_in_both(degrees):
     """No closed form here: the whole is the sum over halves, each pair another mix of touching and not."""
     first, second = hinged(np.radians(degrees))

@@ -86,9 +86,9 @@ def test_interpenetrating_plates_against_pairs_of_random_points():
 
 def test_random_occluders_against_pairs_of_random_points():
     rng = np.random.default_rng(4)
-    for _ in range(3):
+    for _ in range(2):
         occluders = [np.array([0.5, 0.5, 0.5]) + 0.4 * rng.normal(size=(3, 3)) for _ in range(2)]
-        mean, error = by_definition(SQUARE, ABOVE, occluders, 50_000, rng)
+        mean, error = by_definition(SQUARE, ABOVE, occluders, 30_000, rng)
         found = exchange_among(SQUARE, ABOVE, occluders)
         assert 0 <= found <= CLEAR * (1 + 1e-12)
         # four standard errors: one false alarm in 16 000
