@@ -14,18 +14,9 @@ MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
     *("settings", "scene", "textures", "emitters", "report", "workers", "kernel", "patches"),
-    *("polygon", "quadrature", "lambert", "contour", "visibility", "analytic", "bodies", "closed_forms", "transport"),
-    *(
-        "sampled",
-        "estimators",
-        "solver",
-        "cases",
-        "case_scene",
-        "case_factors",
-        "case_solutions",
-        "shipped_cases",
-        "verify",
-    ),
+    *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
+    *("transport", "sampled", "estimators", "solver", "cases", "case_scene", "case_factors", "case_solutions"),
+    *("case_spheres", "shipped_cases", "verify"),
     *("receivers", "radiosity", "charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing"),
     *("gather", "lightmap", "bake"),
 )

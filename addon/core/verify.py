@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from . import case_factors, case_solutions
+from . import case_factors, case_solutions, case_spheres
 from .case_scene import case_scene
 from .cases import Case, CaseError, flat, tolerance_of
 from .sampled import SampledEstimator
@@ -109,11 +109,11 @@ HANDLERS: tuple[tuple[Callable[[Case], bool], Handler], ...] = (
     (_says(r"b floor.*hole|b .*escaping.*hole"), case_solutions.pinhole_case),
     (lambda case: isinstance(case.exact, dict) and "slit" in case.surfaces, case_solutions.slit_case),
     (_says(r"max b in room 2"), case_solutions.divided_rooms_case),
-    (lambda case: any(key.startswith("zones") for key in case.params), case_solutions.zones_case),
-    (_says(r"^b wall.*escaped", params=("f", "rho")), case_solutions.cavity_case),
-    (_says(r"b wall.*b cap|b cap.*b wall", params=("f", "rho")), case_solutions.lit_cap_case),
-    (_says(r"b1.*b2", params=("f1", "f2")), case_solutions.port_case),
-    (_says(r"b inner.*b outer"), case_solutions.concentric_case),
+    (lambda case: any(key.startswith("zones") for key in case.params), case_spheres.zones_case),
+    (_says(r"^b wall.*escaped", params=("f", "rho")), case_spheres.cavity_case),
+    (_says(r"b wall.*b cap|b cap.*b wall", params=("f", "rho")), case_spheres.lit_cap_case),
+    (_says(r"b1.*b2", params=("f1", "f2")), case_spheres.port_case),
+    (_says(r"b inner.*b outer"), case_spheres.concentric_case),
     (lambda case: bool(re.search(r"b1\s*,\s*b2", case.quantity.lower())) and "plate" in (case.text + case.id).lower(),
      case_solutions.plates_case),
 )  # fmt: skip
