@@ -66,6 +66,9 @@ class SampledEstimator:
 
     def factor(self, emitter: Surface, target: Surface, blockers=()) -> Estimate:
         """F from emitter to target among blockers; from the smaller of the two, by reciprocity."""
+        if not target.pieces or not emitter.pieces:
+            # a duplicate, all of which another surface covers
+            return Estimate(*(np.zeros(()) for _ in Estimate.__slots__))
         share = 1.0
         if target.area < emitter.area:
             share = target.area / emitter.area
@@ -101,11 +104,13 @@ class SampledEstimator:
 
         With ``own`` the emitter itself is among the targets, at that index: a body can see itself.
         """
-        parts = emitting_parts(emitter, others, self.name)
+        # a matrix is for a solution, in which errors of single factors average out
+        parts = [list(emitter.pieces)] if own is not None else emitting_parts(emitter, others, self.name)
         scenes = [_PartScene(part, len(parts) == 1, emitter, others, own, self.workers) for part in parts]
         weights = np.array([_area(part) for part in parts]) / emitter.area
         bias = min(1.0, sum(w * min(1.0, part_push(p, others)) for w, part in zip(weights, parts) for p in part[:1]))
-        is_near = len(parts) > 1
+        # many pieces, or parts, even out what each hemicube's pixels do
+        is_near = len(parts) > 1 or len(emitter.pieces) > WHOLE_PIECES
         spent, turn = FIRST_RAYS // REPLICATES, 0
         while True:
             replicates, rays = 0.0, 0
