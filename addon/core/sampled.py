@@ -25,7 +25,7 @@ CLOSE_PARTS = 16  # into which a surface is cut, about, where something is near
 CLOSE = 5.0  # distance in sizes below which one hemicube cannot stand for a part
 PARTS_LIMIT = 512
 WHOLE_PIECES = 8  # a surface of more pieces is not cut: its pieces are small already
-MATRIX_RAYS = 1 << 20  # of a row of a matrix; its errors average out in a solution
+COARSE_RAYS = 1 << 22  # of a row, where only a solution is wanted: its errors average out
 FIRST_RAYS = 1 << 18  # of all replicates together
 NEAR_BIAS = 10.0  # of 1 / resolution^4, relative: what is left of the pixels' midpoints after extrapolation
 FAR_BIAS = 0.5  # of a pixel's delta form factor: far away, all hemicubes see the target through the same pixels
@@ -85,8 +85,7 @@ class SampledEstimator:
         """F of all pairs, float64 (N, N); what is much smaller than the emitter by reciprocity from its own side."""
         rows = []
         for k, emitter in enumerate(surfaces):
-            coarse = replace(self, ray_limit=min(self.ray_limit, MATRIX_RAYS))
-            row = coarse._row(emitter, [*surfaces[:k], *surfaces[k + 1 :], *blockers], self.wanted, own=k)
+            row = self._row(emitter, [*surfaces[:k], *surfaces[k + 1 :], *blockers], self.wanted, own=k)
             rows.append([getattr(row, key)[: len(surfaces)] for key in Estimate.__slots__])
         parts = [np.stack(part) for part in zip(*rows)]
         areas = np.array([s.area for s in surfaces])
@@ -104,13 +103,13 @@ class SampledEstimator:
 
         With ``own`` the emitter itself is among the targets, at that index: a body can see itself.
         """
-        # a matrix is for a solution, in which errors of single factors average out
-        parts = [list(emitter.pieces)] if own is not None else emitting_parts(emitter, others, self.name)
+        is_coarse = self.ray_limit <= COARSE_RAYS
+        parts = [list(emitter.pieces)] if is_coarse else emitting_parts(emitter, others, self.name)
         scenes = [_PartScene(part, len(parts) == 1, emitter, others, own, self.workers) for part in parts]
         weights = np.array([_area(part) for part in parts]) / emitter.area
         bias = min(1.0, sum(w * min(1.0, part_push(p, others)) for w, part in zip(weights, parts) for p in part[:1]))
         # many pieces, or parts, even out what each hemicube's pixels do
-        is_near = len(parts) > 1 or len(emitter.pieces) > WHOLE_PIECES
+        is_near = len(parts) > 1 or len(emitter.pieces) > WHOLE_PIECES or is_coarse
         spent, turn = FIRST_RAYS // REPLICATES, 0
         while True:
             replicates, rays = 0.0, 0
@@ -122,6 +121,10 @@ class SampledEstimator:
             if estimate(replicates, rays).bound.max() <= wanted or 4 * rays > self.ray_limit:
                 return self._with_bias(estimate(replicates, rays, bias), is_near)
             spent, turn = 4 * spent, turn + 1
+
+    def coarser(self) -> SampledEstimator:
+        """The same for the form factors of a solution."""
+        return replace(self, ray_limit=COARSE_RAYS)
 
     def _replicates(self, scene, rays, first, is_near):
         """Factors of a part (REPLICATES, N), and the rays traced for them, ``rays`` or more from each of its sides."""
