@@ -51,9 +51,10 @@ def main(argv: list[str] | None = None) -> int:
 
 def _expected_errors():
     """Exceptions with a message for the user; looked up after a failure because their modules import NumPy and bpy."""
+    from .core.cases import CaseError
     from .core.scene import SceneError
 
-    errors = (CommandError, SettingsError, SceneError, OSError)
+    errors = (CommandError, SettingsError, SceneError, CaseError, OSError)
     if "bpy" in sys.modules:
         from .blender.files import FileError
         from .blender.picture import PictureError
@@ -78,7 +79,23 @@ def parser() -> argparse.ArgumentParser:
     picture.add_argument("output", type=Path, metavar="OUT.png")
     picture.add_argument("--lightmap", type=Path, metavar="OUT.png", help="the lightmap itself, too, to look at")
     picture.set_defaults(run=run_picture)
+    _add_verify(commands)
     return top
+
+
+def _add_verify(commands):
+    verify = commands.add_parser(
+        "verify",
+        help="compute exact cases and hold them against their values",
+        description="Compute exact cases and hold them against their values; exit code 1 when one is off.",
+    )
+    verify.set_defaults(run=run_verify)
+    add = verify.add_argument
+    add("cases", type=Path, nargs="?", metavar="CASES.json", help="the cases (default: a set from closed forms)")
+    add("--method", choices=("analytic", "hemicube", "monte-carlo"), default="analytic", help="form factors")
+    add("--report", type=Path, metavar="OUT.json", help="write the results as JSON")
+    add("--seed", type=int, default=DEFAULTS.seed, help="of the sampled methods (default: %(default)s)")
+    add("--threads", type=int, default=DEFAULTS.threads, metavar="N", help="0 = all cores (default)")
 
 
 def _add_bake(commands):
@@ -190,6 +207,30 @@ def run_picture(args: argparse.Namespace) -> None:
                 raise CommandError(f"{args.input} holds no lightmap")
             picture.save_lightmap_png(image, args.lightmap)
     print(args.output)
+
+
+def run_verify(args: argparse.Namespace) -> None:
+    """``patchlight verify``: a line per case as it is done, the report, and an error when a case is off."""
+    from .core import verify
+    from .core.cases import load_cases
+    from .core.estimators import make_estimator
+    from .core.shipped_cases import shipped_cases
+    from .core.workers import Workers
+
+    cases = load_cases(args.cases) if args.cases else shipped_cases()
+    if args.report:
+        args.report.touch()  # fail before the work rather than after it
+    print(verify.HEADER)
+    with Workers(args.threads or os.cpu_count() or 1) as workers:
+        estimator = make_estimator(args.method, workers, args.seed)
+        results = verify.run_cases(cases, estimator, args.method, lambda result: print(verify.row(result), flush=True))
+    print(verify.summary(results, args.method, estimator.setting))
+    if args.report:
+        report = verify.report(results, args.method, estimator.setting)
+        args.report.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    failed = [result.id for result in results if not result.passed]
+    if failed:
+        raise CommandError(f"{len(failed)} of {len(results)} cases failed, the first is {failed[0]}")
 
 
 def _require_writable(output, args):

@@ -14,8 +14,10 @@ MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
     *("ranges", "settings", "scene", "sound_faces", "textures", "emitters", "report", "workers", "kernel", "patches"),
-    *("transport", "exchange", "solver", "dense", "conjugate_gradient", "progressive", "stochastic"),
-    *("receivers", "texel_light", "guides", "radiosity"),
+    *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
+    *("transport", "sampled", "estimators", "exchange", "solver", "dense"),
+    *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
+    *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides", "radiosity"),
     *("charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing", "probes", "gather", "lightmap", "bake"),
 )
 BLENDER = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "idprop"}

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from addon.core.patches import subdivide
-from addon.core.transport import HemicubeFormFactors, MonteCarloFormFactors, form_factors
+from addon.core.transport import (
+    REPLICATES,
+    HemicubeFormFactors,
+    MonteCarloFormFactors,
+    estimate,
+    form_factors,
+    replicated,
+)
 from tests.scenes import cornell_box, kernel_of
 
 
@@ -57,3 +64,29 @@ def test_a_seed_of_its_own_makes_another_estimate(kernel):
 def test_a_side_that_is_none_is_refused(kernel):
     with pytest.raises(ValueError, match="range"):
         form_factors(kernel, "monte-carlo", 0.1, 0).rows([kernel.side_count])
+
+
+# ---- stated errors ----
+
+
+def test_nothing_hit_is_the_rule_of_three():
+    found = estimate(np.zeros((REPLICATES, 2)), rays=3000)
+    assert (found.value == 0).all()
+    assert found.bound == pytest.approx([1e-3, 1e-3])
+
+
+def test_a_99_percent_bound_covers_99_percent():
+    rng = np.random.default_rng(0)
+    values = rng.normal(0.3, 0.01, size=(REPLICATES, 20_000))
+    found = estimate(values, rays=10**9)
+    missed = np.mean(np.abs(found.value - 0.3) > found.bound)
+    # 20 000 trials of 1 %: standard error 7e-4, four of them
+    assert abs(missed - 0.01) < 0.003
+
+
+def test_replicates_are_independent_and_repeatable(kernel):
+    estimator = form_factors(kernel, "monte-carlo", 0.1, 3)
+    first, again = (replicated(estimator, [0, 4], lambda rows: rows.astype(np.float64)) for _ in range(2))
+    assert first.shape == (REPLICATES, 2, kernel.side_count)
+    assert (first == again).all()
+    assert len(np.unique(first.reshape(REPLICATES, -1), axis=0)) == REPLICATES

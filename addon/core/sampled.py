@@ -1,0 +1,255 @@
+"""Form factors between surfaces by the kernel's rays, with an error from independent replicates.
+
+The emitter is cut into parts, each at the origin of a scene of its own: near what it faces, float32 would lose the gap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .analytic import Surface
+from .bodies import PANEL_ERROR, Body
+from .kernel import KernelScene
+from .patches import subdivide
+from .polygon import are_coplanar, bisect, distance_to, extent, fault_of, polygon_area
+from .quadrature import fan
+from .scene import Material, Scene, SceneObject
+from .transport import REPLICATES, Estimate, HemicubeFormFactors, MonteCarloFormFactors, estimate, replicated
+from .workers import Workers
+
+PUSH = 2.0**-20  # of a triangle's largest coordinate: how far off it the kernel's rays start (native/src/scene.h)
+PUSH_ALLOWED = 2e-5  # share of the emitter whose rays may start beyond what they should hit
+CLOSE_PARTS = 16  # into which a surface is cut, about, where something is near
+CLOSE = 5.0  # distance in sizes below which one hemicube cannot stand for a part
+PARTS_LIMIT = 512
+WHOLE_PIECES = 8  # a surface of more pieces is not cut: its pieces are small already
+COARSE_RAYS = 1 << 22  # of a row, where only a solution is wanted: its errors average out
+FIRST_RAYS = 1 << 18  # of all replicates together
+NEAR_BIAS = 10.0  # of 1 / resolution^4, relative: what is left of the pixels' midpoints after extrapolation
+FAR_BIAS = 0.5  # of a pixel's delta form factor: far away, all hemicubes see the target through the same pixels
+FAR_RESOLUTION = 64
+
+
+@dataclass(frozen=True, slots=True)
+class SampledEstimator:
+    """By the kernel's rays, in independent replicates, with more rays until the error is small enough.
+
+    Attributes
+    ----------
+    name : "hemicube" or "monte-carlo"
+    workers : threads
+    wanted : bound of the error at which it stops
+    ray_limit : rays of one row, all replicates together
+    resolution : pixels along a hemicube's top face, near; half of them, too, to extrapolate to none
+    seed : int
+    """
+
+    name: str
+    workers: Workers
+    wanted: float = 3e-4
+    ray_limit: int = 1 << 25
+    resolution: int = 24
+    seed: int = 0
+
+    @property
+    def setting(self) -> str:
+        """What is the same for every case, in words."""
+        how = (
+            f"hemicubes of {self.resolution}^2 and half as fine near, {FAR_RESOLUTION}^2 far, "
+            if self.name == "hemicube"
+            else ""
+        )
+        limit = self.ray_limit.bit_length() - 1
+        return f"{how}{REPLICATES} replicates, rays until the 99 % bound is {self.wanted:g}, at most 2^{limit}"
+
+    def factor(self, emitter: Surface, target: Surface, blockers=()) -> Estimate:
+        """F from emitter to target among blockers; from the smaller of the two, by reciprocity."""
+        if not target.pieces or not emitter.pieces:
+            # a duplicate, all of which another surface covers
+            return Estimate(*(np.zeros(()) for _ in Estimate.__slots__))
+        share = 1.0
+        if target.area < emitter.area:
+            share = target.area / emitter.area
+            emitter, target = target, emitter
+        row = self._row(emitter, [target, *blockers], self.wanted / share)
+        return Estimate(*(np.asarray(getattr(row, key)[0] * share) for key in Estimate.__slots__))
+
+    def element(self, point, normal, target: Surface, blockers=()) -> Estimate:
+        """F from an element to target among blockers: a triangle so small that F is the same all over it."""
+        near = min(distance_to(point, piece) for piece in target.pieces)
+        return self.factor(Surface("dA", (_triangle_at(point, normal, 1e-5 * near),)), target, blockers)
+
+    def matrix(self, surfaces, blockers=()) -> Estimate:
+        """F of all pairs, float64 (N, N); what is much smaller than the emitter by reciprocity from its own side."""
+        rows = []
+        for k, emitter in enumerate(surfaces):
+            row = self._row(emitter, [*surfaces[:k], *surfaces[k + 1 :], *blockers], self.wanted, own=k)
+            rows.append([getattr(row, key)[: len(surfaces)] for key in Estimate.__slots__])
+        parts = [np.stack(part) for part in zip(*rows)]
+        areas = np.array([s.area for s in surfaces])
+        is_small = areas[None, :] < areas[:, None] / 16
+        there = [part.T * areas[None, :] / areas[:, None] for part in parts]
+        return Estimate(*(np.where(is_small, far, near) for near, far in zip(parts, there)))
+
+    def body_matrix(self, bodies: list[Body]) -> Estimate:
+        """F of all pairs of bodies, float64 (N, N)."""
+        found = self.matrix([body.surface() for body in bodies])
+        return replace(found, bound=found.bound + PANEL_ERROR * np.abs(found.value))
+
+    def _row(self, emitter, others, wanted, own=None) -> Estimate:
+        """F from a surface to each of the others, float64 (N,), refined until its bound is as wanted.
+
+        With ``own`` the emitter itself is among the targets, at that index: a body can see itself.
+        """
+        is_coarse = self.ray_limit <= COARSE_RAYS
+        parts = [list(emitter.pieces)] if is_coarse else emitting_parts(emitter, others, self.name)
+        scenes = [_PartScene(part, len(parts) == 1, emitter, others, own, self.workers) for part in parts]
+        weights = np.array([_area(part) for part in parts]) / emitter.area
+        bias = min(1.0, sum(w * min(1.0, part_push(p, others)) for w, part in zip(weights, parts) for p in part[:1]))
+        # many pieces, or parts, even out what each hemicube's pixels do
+        is_near = len(parts) > 1 or len(emitter.pieces) > WHOLE_PIECES or is_coarse
+        spent, turn = FIRST_RAYS // REPLICATES, 0
+        while True:
+            replicates, rays = 0.0, 0
+            for k, (weight, scene) in enumerate(zip(weights, scenes)):
+                # parts must not share a sequence: their errors would add up
+                first, share = REPLICATES * (turn * len(parts) + k), max(1, spent // (len(parts) * len(scene.sides)))
+                found, traced = self._replicates(scene, share, first, is_near)
+                replicates, rays = replicates + weight * found, rays + traced
+            if estimate(replicates, rays).bound.max() <= wanted or 4 * rays > self.ray_limit:
+                return self._with_bias(estimate(replicates, rays, bias), is_near)
+            spent, turn = 4 * spent, turn + 1
+
+    def coarser(self) -> SampledEstimator:
+        """The same for the form factors of a solution."""
+        return replace(self, ray_limit=COARSE_RAYS)
+
+    def _replicates(self, scene, rays, first, is_near):
+        """Factors of a part (REPLICATES, N), and the rays traced for them, ``rays`` or more from each of its sides."""
+        if self.name == "monte-carlo":
+            chosen = [(1.0, MonteCarloFormFactors(scene.kernel, 1 << (rays - 1).bit_length(), self.seed))]
+        else:
+            positions = max(1, round(rays / (3 * self.resolution**2)))
+            fine = HemicubeFormFactors(scene.kernel, FAR_RESOLUTION, positions, self.seed)
+            chosen = [(1.0, fine)]
+            if is_near:
+                # midpoints of pixels are off by the square of their size, evened out over positions (Richardson)
+                near = [replace(fine, resolution=size) for size in (self.resolution, self.resolution // 2)]
+                chosen = list(zip((4 / 3, -1 / 3), near))
+        found = sum(w * replicated(one, scene.sides, scene.reduce, first) for w, one in chosen)
+        return found, REPLICATES * len(scene.sides) * sum(one.rays_per_row for _, one in chosen)
+
+    def _with_bias(self, found: Estimate, is_near) -> Estimate:
+        if self.name == "monte-carlo":
+            return found
+        if is_near:
+            return replace(found, bound=found.bound + NEAR_BIAS / self.resolution**4 * np.abs(found.value))
+        # the middle pixels of the top face: the largest there are
+        pixel = (2 / FAR_RESOLUTION) ** 2 / np.pi
+        return replace(found, bound=found.bound + FAR_BIAS * pixel + np.abs(found.value) / FAR_RESOLUTION**2)
+
+
+def _area(part):
+    return sum(polygon_area(piece) for piece in part)
+
+
+def nearest(piece, others) -> float:
+    """Distance from a piece's centre to the nearest other surface that is not coplanar with it [m]."""
+    centre = piece.mean(axis=0)
+    near = (distance_to(centre, p) for s in others for p in s.pieces if not are_coplanar(p, piece))
+    return max(min(near, default=np.inf), 1e-300)
+
+
+def part_push(piece, others) -> float:
+    """How far off a piece its rays start, in distances from its centre to what is nearest, doubled."""
+    return 2 * PUSH * np.abs(piece - piece.mean(axis=0)).max() / nearest(piece, others)
+
+
+def emitting_parts(emitter: Surface, others, method: str):
+    """A surface as parts, lists of pieces, small where it comes near others: for float32, and for hemicubes, of which
+    one stands for a part only where nothing is near."""
+    pieces = [piece for piece in emitter.pieces if fault_of(piece) is None]
+    if len(pieces) > WHOLE_PIECES:
+        return [pieces]
+
+    def lost(piece):
+        return polygon_area(piece) / emitter.area * min(1.0, part_push(piece, others)) / PUSH_ALLOWED
+
+    if method == "hemicube":
+        while len(pieces) < CLOSE_PARTS and any(nearest(p, others) < CLOSE * extent(p) for p in pieces):
+            pieces = [half for piece in pieces for half in bisect(piece) if len(half)]
+    losses = [lost(piece) for piece in pieces]
+    while sum(losses) > 1 and len(pieces) < PARTS_LIMIT:
+        worst = int(np.argmax(losses))
+        losses.pop(worst)
+        halves = [half for half in bisect(pieces.pop(worst)) if len(half)]
+        pieces += halves
+        losses += [lost(half) for half in halves]
+    return [[piece] for piece in pieces]
+
+
+class _PartScene:
+    """A part of the emitter, what is not in its plane of the rest, and the others; the part's centre is the origin."""
+
+    def __init__(self, part, is_whole, emitter, others, own, workers):
+        targets = list(others)
+        place = len(targets) if own is None else own
+        if is_whole:
+            # it emits as it is, and may see itself
+            targets.insert(place, emitter)
+        else:
+            rest = tuple(p for p in emitter.pieces if not are_coplanar(p, part[0]))
+            targets.insert(place, Surface(emitter.name, rest))
+            place = len(targets)
+            targets.append(Surface("part", tuple(part)))
+        centre = np.concatenate(part).mean(axis=0)
+        triangles, owners = _triangles(targets)
+        scene = _scene_about(centre, triangles)
+        self.kernel = KernelScene(scene, workers)
+        patches = subdivide(scene, self.kernel, 1e30, 8 * len(triangles), 0)
+        owners = owners[patches.triangles]
+        self.sides = 2 * np.flatnonzero(owners == place)
+        self._weights = patches.areas[owners == place] / patches.areas[owners == place].sum()
+        self._member = (owners[:, None] == np.arange(len(targets))).astype(np.float64)
+
+    def reduce(self, rows):
+        """Rows (K, 2 P) as factors to the fronts of the targets (N,)."""
+        return self._weights @ (rows[:, ::2].astype(np.float64) @ self._member)
+
+
+def _triangles(surfaces):
+    triangles, owners = [], []
+    for k, one in enumerate(surfaces):
+        for piece in one.pieces:
+            parts = fan(piece)
+            parts = parts[[polygon_area(part) > 0 for part in parts]]
+            triangles.append(parts)
+            owners += [k] * len(parts)
+    return np.concatenate(triangles), np.array(owners)
+
+
+def _scene_about(centre, triangles):
+    """A scene whose kernel origin is ``centre``: two vertices that no triangle uses even out its bounds."""
+    corners = triangles.reshape(-1, 3) - centre
+    reach = np.abs(corners).max(axis=0)
+    count = len(triangles)
+    return Scene(
+        vertices=np.concatenate([corners, [reach, -reach]]),
+        triangles=np.arange(3 * count, dtype=np.int32).reshape(-1, 3),
+        corner_normals=np.zeros((count, 3, 3), np.float32),
+        uvs=np.zeros((count, 3, 2), np.float32),
+        triangle_materials=np.zeros(count, np.int32),
+        objects=(SceneObject("surfaces", 0, count),),
+        materials=(Material("black"),),
+    )
+
+
+def _triangle_at(point, normal, size):
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    u = np.cross(helper, normal)
+    u /= np.linalg.norm(u)
+    v = np.cross(normal, u)
+    turns = 2 * np.pi * np.arange(3) / 3
+    return point + size * (np.cos(turns)[:, None] * u + np.sin(turns)[:, None] * v)
