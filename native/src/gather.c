@@ -11,6 +11,7 @@
 #include "patches.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 enum { MOST_STEPS = 64 }; /* of a ray caught between surfaces that touch; then a mean has to do */
 
@@ -22,6 +23,7 @@ typedef struct gather_job {
     const pl_lights *lights;
     pl_light_balls balls;
     float *importances; /* room for one number a light */
+    bool has_bright_sides;
     uint64_t rays;
 } gather_job;
 
@@ -33,15 +35,13 @@ typedef struct ray_random {
 static float draw(ray_random *random) { return unit_float(hash_pair(random->seed, ++random->drawn)); }
 
 /*
- * The side that a ray of a smooth receiver takes its light from. Such a ray may start below the plane of its
- * own triangle, or pass below a neighbour's: there the smooth surface that the triangles stand for has
- * nothing, and the light lost to the inside would darken every smooth object. Its front is what is seen.
+ * Whether a ray sees the back of what it hits. A smooth receiver's ray may start below the plane of its own triangle,
+ * or pass below a neighbour's: there the smooth surface that the triangles stand for has nothing, and the light lost
+ * to the inside would darken every smooth object. Its front is what is seen.
  */
-static size_t smooth_side(const pl_patches *patches, const pl_receiver_frame *frame, vec3 direction,
-                          const pl_hit *hit) {
-    const size_t side = hit_side(patches, hit);
-    const bool starts_below = vec3_dot(frame->geometric, direction) <= 0;
-    return starts_below && hit->is_back != frame->side ? side ^ 1u : side;
+static bool sees_back(const pl_receiver_frame *frame, vec3 direction, const pl_hit *hit) {
+    const bool starts_below = frame->is_smooth && vec3_dot(frame->geometric, direction) <= 0;
+    return starts_below && hit->is_back != frame->side ? !hit->is_back : hit->is_back;
 }
 
 static void add(float *io_sum, const float *rgb, const float *weight) {
@@ -70,10 +70,8 @@ static void sample_direct(gather_job *job, const pl_hit *hit, size_t side, ray_r
         io_sum[k] += rgb[k] * weight[k] * job->solution->reflectance[3 * (side / 2) + (size_t)k];
 }
 
-/* The radiosity of the texel that a ray hits the front of; NULL where there is none. */
+/* The radiosity of the texel that a ray hits; NULL where there is none. */
 static const float *texel_hit(const pl_texel_light *texels, const pl_hit *hit) {
-    if (!texels || hit->is_back)
-        return NULL;
     const float *uv = texels->uvs + 6 * (size_t)hit->triangle;
     const float u = uv[0] + hit->u * (uv[2] - uv[0]) + hit->v * (uv[4] - uv[0]);
     const float v = uv[1] + hit->u * (uv[3] - uv[1]) + hit->v * (uv[5] - uv[1]);
@@ -106,13 +104,19 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             add(io_sum, solution->sky, weight);
             return;
         }
-        const size_t side = step == 0 && frame->is_smooth ? smooth_side(job->patches, frame, direction, &hit)
-                                                          : hit_side(job->patches, &hit);
+        const bool is_back = step == 0 ? sees_back(frame, direction, &hit) : hit.is_back;
+        const bool is_last = step == MOST_STEPS - 1;
+        const float *seen = job->texels && !is_back ? texel_hit(job->texels, &hit) : NULL;
+        const bool takes_texel = seen && (hit.distance >= job->texels->reach || is_last);
+        /* most rays end here, before the patches are touched: what they cost is cache misses */
+        if (takes_texel && (step || !job->has_bright_sides)) {
+            add(io_sum, seen, weight);
+            return;
+        }
+        const size_t side = 2 * (size_t)patch_at(job->patches, hit.triangle, hit.u, hit.v) + is_back;
         if (step == 0 && solution->kinds[side] == PL_SIDE_LIGHT)
             return;
-        const float *seen = texel_hit(job->texels, &hit);
-        const bool is_last = step == MOST_STEPS - 1;
-        if (seen ? hit.distance >= job->texels->reach || is_last : take_patch(job, &hit, side, is_last)) {
+        if (seen ? takes_texel : take_patch(job, &hit, side, is_last)) {
             add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
             return;
         }
@@ -158,6 +162,7 @@ static pl_status begin(gather_job *job, const pl_gather_scene *in, const pl_rece
                         .solution = in->solution,
                         .texels = in->texels,
                         .lights = in->lights};
+    job->has_bright_sides = memchr(in->solution->kinds, PL_SIDE_LIGHT, 2 * pl_patches_count(in->patches)) != NULL;
     job->importances = malloc(sizeof(float) * (in->lights->count + 1));
     if (!job->importances || !light_balls_create(in->lights, &job->balls)) {
         free(job->importances);
