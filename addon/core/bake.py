@@ -11,7 +11,7 @@ from .gather import Irradiance, gather_irradiance
 from .kernel import KernelScene
 from .lightmap import Lightmap, assemble
 from .probes import seen_through_corners, seen_through_lightmap
-from .radiosity import UNSHOT_LIMIT, Solved, solve_radiosity
+from .radiosity import MOST_REFLECTANCE, UNSHOT_LIMIT, Solved, solve_radiosity
 from .receivers import surface_receivers, vertex_receivers
 from .report import Report
 from .scene import Scene, SceneError, radiance_from_exitance
@@ -108,6 +108,11 @@ def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, l
         warnings.append(
             f"the target error {settings.error:g} was not reached: sampling stopped at an estimated "
             f"{irradiance.relative_error:.3g}" + (" by the time limit" if settings.time_limit else "")
+        )
+    if (solved.patches.reflectance > MOST_REFLECTANCE).any():
+        warnings.append(
+            f"some surfaces reflect all light: it is solved for at a reflectance of {MOST_REFLECTANCE}, as it "
+            "would have no bound in a closed room"
         )
     energy = solved.solution.energy
     if solved.solution.solver != "direct" and energy.unshot > 2 * UNSHOT_LIMIT * energy.shot:

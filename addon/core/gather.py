@@ -29,7 +29,7 @@ DIRECT_PASSES = 3  # each with four times the shadow rays of the one before, for
 DIRECT_SHARE = 0.5  # of the error that direct light may have
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
-FURTHER = 2.0  # probes look so many times further before they take a texel's or a patch's light for what is there
+FURTHER = 2.0  # seen points look so many times further before they take a texel's or a patch's light for what is there
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
 
 
@@ -136,7 +136,11 @@ def gather_irradiance(
     chosen = chosen_receivers(len(receivers))
     probes = _measure(job.part(chosen), error, seed + 1)
     values, rms, rays, in_time = _gather_until(job, grid, direct, chosen, probes, error, seed, is_late, on_step)
-    at_points = _measure(replace(job, receivers=seen.receivers, guides=no_guides(len(seen.receivers))), error, seed + 4)
+    at_points = _measure(
+        replace(job, receivers=seen.receivers, guides=no_guides(len(seen.receivers))).looking_further(FURTHER),
+        error,
+        seed + 4,
+    )
     shown = seen.look_up(values)
     traced = {
         "direct": shadow_rays,
@@ -157,12 +161,11 @@ def _with_texel_light(job: _Job, grid: TexelGrid, direct, seed, on_step):
 
 
 def _measure(job: _Job, error, seed) -> Measured:
-    """The light at a job's receivers, with many rays, that take little for granted."""
-    further = job.looking_further(FURTHER)
-    direct, variance, shadow_rays = further.direct(4 * shadow_samples(error), seed)
+    """The light at a job's receivers, with many rays."""
+    direct, variance, shadow_rays = job.direct(4 * shadow_samples(error), seed)
     sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
     count = probe_rays(error)
-    rays = further.gather(np.arange(len(sums), dtype=np.uint32), 0, count, seed, sums)
+    rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, count, seed, sums)
     gathered = (sums / count) @ LUMINANCE
     variance = variance + gathered.var(axis=1, ddof=1) / REPLICATES
     return Measured(direct @ LUMINANCE + gathered.mean(axis=1), variance, shadow_rays + rays)

@@ -17,6 +17,7 @@ GROUP = 256  # receivers that share a guide
 LEARNERS = 32  # of a group, that look for all
 LEARNING_RAYS = 32  # of each
 EVEN = 0.25  # of the rays go everywhere alike: what the learners missed keeps a bounded weight
+WIDEST = 1 / 8  # of the scene: groups that reach further have no view in common
 NORMAL_CELLS = 3  # each axis of a normal is cut into so many: receivers that look elsewhere are no neighbours
 
 
@@ -51,10 +52,10 @@ def learn_guides(
     kernel: KernelScene, solution, texel_light, emitters, receivers: Receivers, seed: int
 ) -> tuple[Guides, int]:
     """Guides for receivers, and the rays that it took to learn them."""
-    order, firsts = _neighbours(receivers)
-    groups = np.empty(len(receivers), np.int32)
-    groups[order] = np.repeat(np.arange(len(firsts) - 1, dtype=np.int32), np.diff(firsts))
-    members, first_members = _learners(order, firsts)
+    order, starts, ends = _neighbours(receivers)
+    groups = np.full(len(receivers), -1, np.int32)
+    groups[order[_runs(starts, ends)]] = np.repeat(np.arange(len(starts), dtype=np.int32), ends - starts)
+    members, first_members = _learners(order, starts, ends)
     moments, rays = kernel.learn_guides(
         solution, texel_light, emitters, receivers, members, first_members, LEARNING_RAYS, seed
     )
@@ -70,7 +71,7 @@ def _shares(moments):
 
 
 def _neighbours(receivers):
-    """Receivers in an order in which neighbours are near, and where each group starts in it, (G + 1,)."""
+    """Receivers in an order in which neighbours are near, and where each group starts and ends in it, (G,)."""
     low = receivers.positions.min(axis=0, initial=np.inf)
     extent = max(float(np.ptp(receivers.positions, axis=0).max()), 1e-30)
     cells = np.clip((receivers.positions - low) / extent * 1023, 0, 1023).astype(np.uint64)
@@ -83,10 +84,21 @@ def _neighbours(receivers):
     )
     order = np.argsort(way << np.uint64(30) | place, kind="stable")
     # a group ends where its receivers look elsewhere, or when it is full
-    starts = np.flatnonzero(np.diff(way[order], prepend=way[order][:1] + np.uint64(1)))
-    ends = np.append(starts[1:], len(order))
-    firsts = [np.arange(start, end, GROUP) for start, end in zip(starts, ends)]
-    return order, np.append(np.concatenate(firsts), len(order))
+    turns = np.flatnonzero(np.diff(way[order], prepend=way[order][:1] + np.uint64(1)))
+    cuts = [np.arange(turn, end, GROUP) for turn, end in zip(turns, np.append(turns[1:], len(order)))]
+    starts = np.concatenate(cuts) if cuts else np.zeros(0, np.int64)
+    ends = np.append(starts[1:], len(order))[: len(starts)]
+    ordered = receivers.positions[order]
+    width = np.maximum.reduceat(ordered, starts) - np.minimum.reduceat(ordered, starts) if cuts else np.zeros((0, 3))
+    is_narrow = width.max(axis=1, initial=0.0) <= WIDEST * extent
+    return order, starts[is_narrow], ends[is_narrow]
+
+
+def _runs(starts, ends):
+    """All places of the runs from starts to ends, one after the other."""
+    counts = ends - starts
+    before = np.cumsum(counts) - counts
+    return np.arange(counts.sum()) + np.repeat(starts - before, counts)
 
 
 def _spread_bits(x):
@@ -96,12 +108,12 @@ def _spread_bits(x):
     return x
 
 
-def _learners(order, firsts):
+def _learners(order, starts, ends):
     """Some receivers of each group, evenly through it: their indices, and where each group's start."""
-    sizes = np.diff(firsts)
+    sizes = ends - starts
     counts = np.minimum(sizes, LEARNERS)
     first_members = np.append(0, np.cumsum(counts))
     group = np.repeat(np.arange(len(sizes)), counts)
     place = np.arange(first_members[-1]) - first_members[group]
-    members = order[firsts[group] + place * sizes[group] // counts[group]]
+    members = order[starts[group] + place * sizes[group] // np.maximum(counts[group], 1)]
     return members.astype(np.uint32), first_members.astype(np.uint32)

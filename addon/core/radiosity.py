@@ -35,11 +35,10 @@ UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it
 MOST_REFLECTANCE = 0.9999  # while light is solved for: in a closed room that absorbs nothing it has no bound
 MIXED = 0.5  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
-LEAK = 0.02  # the same where part of the side is in shadow: what a wall keeps out must not come in along the floor
-SHADOW = 0.25  # of the brightest point of a side: darker ones are in shadow
 BRIGHT = 20.0  # times the median radiosity: brighter sides are sampled as lights, which few gather rays would find
 BRIGHT_SHARE = 0.005  # of all area that they may be: where much is bright, gather rays find it well
-BRIGHT_FLUX = 0.1  # of all flux that they must send out: every receiver pays for them
+BRIGHT_FLUX = 0.1  # of all flux that they must send out where there are more than FEW: every receiver pays for them
+FEW = 128  # sides
 CONFINED = 0.5  # a side of which fewer rays leave its reach lies in a gap
 OPENNESS_RAYS = 8
 REACH = 3.0  # patch sizes: nearer hits go on from the point hit
@@ -108,14 +107,14 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     size = settings.patch_size or patch_size_for(scene, budget)
     patches = subdivide(scene, kernel, size, budget, settings.seed)
     sky = np.asarray(exitance_from_radiance(scene.world_radiance), np.float32).reshape(1, 3)
-    direct, spread, has_shadow, traced = _direct_on_patches(
+    direct, spread, traced = _direct_on_patches(
         scene, kernel, patches, emitters, settings.seed, lambda done: on_step(0.4 * done)
     )
     daylight, sky_rays = _sky_on_patches(scene, kernel, patches, emitters, sky, settings.seed)
     emitted = patches.side_reflectance * (direct + daylight)
     solution = _solve(kernel, patches, emitted, solver, method, settings, lambda done: on_step(0.5 + 0.5 * done))
 
-    kinds, bright = _side_kinds(patches, solution.radiosity, spread, has_shadow)
+    kinds, bright = _side_kinds(patches, solution.radiosity, spread)
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),
         direct=(patches.side_reflectance * direct).astype(np.float32),
@@ -130,17 +129,18 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     )
 
 
-def _side_kinds(patches, radiosity, spread, has_shadow):
+def _side_kinds(patches, radiosity, spread):
     """The kind of each side, uint8 (2 P,), and which sides are LIGHT."""
     luminance = radiosity @ LUMINANCE
     lit = np.flatnonzero((luminance > 0) & (patches.side_areas > 0))
     typical = _weighted_median(luminance[lit], patches.side_areas[lit]) if len(lit) else 0.0
     spread = spread * patches.side_reflectance.mean(axis=1) / (luminance + typical + 1e-300)
-    is_bright = (luminance > BRIGHT * typical) & (spread < MIXED) & (patches.side_areas > 0)
+    is_bright = (luminance > BRIGHT * typical) & (spread <= MIXED) & (patches.side_areas > 0)
     is_bright &= _brightest(luminance, patches.side_areas, BRIGHT_SHARE)
     flux = luminance * patches.side_areas
-    is_bright &= flux[is_bright].sum() > BRIGHT_FLUX * flux.sum()
-    is_mixed = spread > np.where(has_shadow, LEAK, MIXED)
+    if np.count_nonzero(is_bright) > FEW and flux[is_bright].sum() < BRIGHT_FLUX * flux.sum():
+        is_bright[:] = False
+    is_mixed = spread > MIXED
     return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
 
 
@@ -223,25 +223,22 @@ def _mean_reflectance(scene):
 
 
 def _direct_on_patches(scene, kernel, patches: Patches, emitters, seed, on_step):
-    """The lights' mean irradiance on every side, float64 (2 P, 3), its spread over the side (2 P,), whether part of
-    the side is in shadow (2 P,), and shadow rays.
+    """The lights' mean irradiance on every side, float64 (2 P, 3), its spread over the side (2 P,), and shadow rays.
 
     A full-size patch is measured at several points; a small one at one, as its neighbours stand in for it when light is
     gathered. What reflects nothing is left dark.
     """
     irradiance, spread = np.zeros((len(patches), 2, 3)), np.zeros((len(patches), 2))
-    has_shadow, rays = np.zeros((len(patches), 2), bool), 0
+    rays = 0
     for chosen, points, share in _measured(patches):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
         values, _, traced = kernel.direct(emitters, receivers, min(points, PATCH_SHADOW_SAMPLES), seed)
         values = values.reshape(-1, 2, points, 3)
         irradiance[chosen] = values.mean(axis=2, dtype=np.float64)
-        at_points = values.mean(axis=3)
-        spread[chosen] = np.ptp(at_points, axis=2)
-        has_shadow[chosen] = at_points.min(axis=2) < SHADOW * at_points.max(axis=2)
+        spread[chosen] = np.ptp(values.mean(axis=3), axis=2)
         rays += traced
         on_step(share)
-    return irradiance.reshape(-1, 3), spread.ravel(), has_shadow.ravel(), rays
+    return irradiance.reshape(-1, 3), spread.ravel(), rays
 
 
 def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):

@@ -81,11 +81,13 @@ def test_all_methods_and_solvers_bake_the_same_cornell_box(cornell_lightmaps, ro
 
 
 def test_a_target_is_met_or_the_report_says_that_it_is_not(cornell_lightmaps):
-    for _, report in cornell_lightmaps.values():
+    # a lamp 1 cm below a ceiling makes a spot on it that few rays find: there the target may be missed
+    plain = lightmap_of(cube_room())[1]
+    for report in (plain, *(report for _, report in cornell_lightmaps.values())):
         assert report.target_error == 0.05
         assert report.target_reached == (report.estimated_error <= 0.05)
         assert report.target_reached != any("was not reached" in warning for warning in report.warnings)
-    assert any(report.target_reached for _, report in cornell_lightmaps.values())
+    assert plain.target_reached
 
 
 def test_the_report_tells_what_ran(cornell_lightmaps):

@@ -6,6 +6,7 @@ import pytest
 from addon.core.bake import bake
 from addon.core.emitters import emitters_of
 from addon.core.gather import gather_irradiance
+from addon.core.probes import SeenPoints
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import vertex_receivers
 from addon.core.scene import AreaLight, Material
@@ -44,7 +45,8 @@ def light_at(threads, method, solver):
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, settings, lambda done: None)
         receivers, _ = vertex_receivers(scene, 30.0)
-        light = gather_irradiance(kernel, solved, receivers, None, 0.1, 0, lambda: False, lambda done: None)
+        seen = SeenPoints(receivers, lambda values: values)
+        light = gather_irradiance(kernel, solved, receivers, None, seen, 0.1, 0, lambda: False, lambda done: None)
     field = [np.ascontiguousarray(array).tobytes() for array in solved.patches.arrays()]
     return solved.solution.radiosity.tobytes(), field, light.values.tobytes(), {**solved.rays, **light.rays}
 
