@@ -52,6 +52,8 @@ def learn_guides(
     kernel: KernelScene, solution, texel_light, emitters, receivers: Receivers, seed: int
 ) -> tuple[Guides, int]:
     """Guides for receivers, and the rays that it took to learn them."""
+    if not len(receivers):
+        return no_guides(0), 0
     order, starts, ends = _neighbours(receivers)
     groups = np.full(len(receivers), -1, np.int32)
     groups[order[_runs(starts, ends)]] = np.repeat(np.arange(len(starts), dtype=np.int32), ends - starts)
@@ -72,25 +74,22 @@ def _shares(moments):
 
 def _neighbours(receivers):
     """Receivers in an order in which neighbours are near, and where each group starts and ends in it, (G,)."""
-    low = receivers.positions.min(axis=0, initial=np.inf)
+    low = receivers.positions.min(axis=0)
     extent = max(float(np.ptp(receivers.positions, axis=0).max()), 1e-30)
     cells = np.clip((receivers.positions - low) / extent * 1023, 0, 1023).astype(np.uint64)
     facing = np.clip((receivers.normals + 1) * (0.5 * NORMAL_CELLS), 0, NORMAL_CELLS - 1).astype(np.uint64)
     way = (facing[:, 0] * NORMAL_CELLS + facing[:, 1]) * NORMAL_CELLS + facing[:, 2]
-    place = (
-        _spread_bits(cells[:, 0])
-        | _spread_bits(cells[:, 1]) << np.uint64(1)
-        | _spread_bits(cells[:, 2]) << np.uint64(2)
-    )
+    x, y, z = (_spread_bits(cells[:, axis]) << np.uint64(axis) for axis in range(3))
+    place = x | y | z
     order = np.argsort(way << np.uint64(30) | place, kind="stable")
     # a group ends where its receivers look elsewhere, or when it is full
     turns = np.flatnonzero(np.diff(way[order], prepend=way[order][:1] + np.uint64(1)))
     cuts = [np.arange(turn, end, GROUP) for turn, end in zip(turns, np.append(turns[1:], len(order)))]
-    starts = np.concatenate(cuts) if cuts else np.zeros(0, np.int64)
-    ends = np.append(starts[1:], len(order))[: len(starts)]
+    starts = np.concatenate(cuts)
+    ends = np.append(starts[1:], len(order))
     ordered = receivers.positions[order]
-    width = np.maximum.reduceat(ordered, starts) - np.minimum.reduceat(ordered, starts) if cuts else np.zeros((0, 3))
-    is_narrow = width.max(axis=1, initial=0.0) <= WIDEST * extent
+    width = np.maximum.reduceat(ordered, starts) - np.minimum.reduceat(ordered, starts)
+    is_narrow = width.max(axis=1) <= WIDEST * extent
     return order, starts[is_narrow], ends[is_narrow]
 
 

@@ -58,7 +58,7 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
                      vec3 origin, vec3 normal, uint32_t seed, float out_rgb[3]) {
     pl_light_sample sample;
     out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
-    const float total = light_importances(lights, balls, origin, normal, importances);
+    const float total = light_importances(lights, balls, origin, normal, false, importances);
     if (total <= 0)
         return false;
     const size_t chosen = choose_light(importances, lights->count, total, sobol(0, 2, seed));
@@ -196,7 +196,8 @@ static uint32_t share_of(uint32_t samples, float part, float total) {
 static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint32_t seed, float out_rgb[3],
                            float *out_variance) {
     float totals[REPLICATES][3] = {{0}};
-    const float total = light_importances(job->lights, &job->balls, frame->origin, frame->shading, job->importances);
+    const float total =
+        light_importances(job->lights, &job->balls, frame->origin, frame->shading, true, job->importances);
     const float threshold = total / (2 * (float)job->samples);
     float weak = 0;
 

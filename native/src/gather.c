@@ -13,6 +13,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* With more lights the shadow of any one matters little, and looking at all of them costs more than the ray. */
+enum { MANY_LIGHTS = 64 };
 enum { MOST_STEPS = 64 }; /* of a ray caught between surfaces that touch; then a mean has to do */
 
 typedef struct gather_job {
@@ -120,7 +122,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
             return;
         }
-        if (seen || solution->kinds[side] == PL_SIDE_MIXED)
+        if (solution->kinds[side] == PL_SIDE_MIXED || (seen && job->lights->count < MANY_LIGHTS))
             sample_direct(job, &hit, side, &random, weight, io_sum);
         else
             add(io_sum, solution->direct + 3 * side, weight);

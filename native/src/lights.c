@@ -388,17 +388,20 @@ static void ball_importances(const pl_light_balls *balls, vec3 point, vec3 norma
     }
 }
 
-static float special_importance(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float ball) {
+static float special_importance(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float ball,
+                                bool closely) {
     const float *p = parameters_of(lights, light);
     switch (lights->kinds[light]) {
     case PL_LIGHT_SUN:
         return sun_importance(p, normal);
     case PL_LIGHT_AREA: {
         const area_light lamp = area_of(p);
+        if (!closely)
+            return ball > 0 && area_faces(&lamp, point) ? ball : 0;
         return ball > 0 ? area_importance(&lamp, p + 3, point, normal, ball) : 0;
     }
     case PL_LIGHT_MESH:
-        return ball > 0 ? mesh_importance(lights, p, point, normal, ball) : 0;
+        return !closely ? ball : ball > 0 ? mesh_importance(lights, p, point, normal, ball) : 0;
     default: {
         const point_light lamp = point_of(p);
         return ball > 0 ? ball * cone_importance(&lamp, point) : 0;
@@ -406,13 +409,14 @@ static float special_importance(const pl_lights *lights, size_t light, vec3 poin
     }
 }
 
-float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal,
+float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal, bool closely,
                         float *out_importances) {
     float total = 0;
     ball_importances(balls, point, normal, out_importances);
     for (size_t k = 0; k < balls->special_count; ++k) {
         const size_t light = balls->special[k];
-        out_importances[light] = bounded(special_importance(lights, light, point, normal, out_importances[light]));
+        out_importances[light] =
+            bounded(special_importance(lights, light, point, normal, out_importances[light], closely));
     }
     for (size_t light = 0; light < balls->count; ++light)
         total += out_importances[light];

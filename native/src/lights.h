@@ -44,9 +44,9 @@ void light_balls_destroy(pl_light_balls *balls);
 
 /*
  * What each light gives unoccluded, as luminance of irradiance: exact where it is near and has a closed form,
- * else a guess that is above 0 wherever a sample can be. Returns their sum.
+ * else, or where not asked for `closely`, a guess that is above 0 wherever a sample can be. Returns their sum.
  */
-float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal,
+float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal, bool closely,
                         float *out_importances);
 
 bool light_has_closed_form(const pl_lights *lights, size_t light);
