@@ -50,7 +50,7 @@ def load_reference(path) -> dict[str, np.ndarray]:
     try:
         with np.load(path) as file:
             arrays = {key: file[key] for key in KEYS}
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, EOFError, ValueError, KeyError) as error:
         raise FileError(f"{path}: is no reference ({error})") from error
     if len({len(array) for array in arrays.values()}) != 1:
         raise FileError(f"{path}: is no reference (its arrays have different lengths)")

@@ -67,7 +67,7 @@ class Outcome:
 
 
 def measured(names: tuple[str, str, str, str, str], runs: int, run: Callable[[int], Callable | Outcome]) -> BenchRow:
-    """The row of ``names`` (stage, scene, method, solver, setting) from ``run(0)``, ``run(1)``, ...; long ones run once.
+    """The row of ``names`` (stage, scene, method, solver, setting) from ``run(0)``, ``run(1)``, ...; if long, from one.
 
     ``run`` may return an Outcome, or a function that makes it from what was computed: judging takes no time of the row.
     """
