@@ -11,6 +11,7 @@ from pathlib import Path
 
 SCENES = ("cube", "l-room", "spheres")
 BLEND_ERRORS, QUICK_ERRORS = (0.1, 0.05, 0.02), (0.1,)
+QUICK_TEXELS = 1 << 16
 NO_MATPLOTLIB = "the plots need matplotlib, which is missing: pip install 'patchlight[bench]', or leave out --out"
 
 
@@ -86,6 +87,8 @@ def _blend_rows(args, reference, options, tell):
             names = ("blend", args.blend.stem, "auto", "auto", f"error {error:g}")
             command = ["bake", str(args.blend), "--error", str(error), "--seed", str(options.seed),
                        "--threads", str(options.threads)]  # fmt: skip
+            if options.is_quick:
+                command += ["--texels", str(QUICK_TEXELS)]
             one = measured(names, 1, lambda _: _baked(command, reference, Path(folder)))  # noqa: B023
             rows.append(one)
             tell(one)

@@ -58,6 +58,7 @@ class _System:
         # what arrives: what is emitted is known, and would hide the error of the rest
         self._truth = self._arriving(np.repeat(exact.system(patches), 2)[:, None] * np.ones(3))
         parts = None if exact.parts is None else exact.parts[patches.triangles]
+        self._is_at_each = parts is None
         self._error_of = _judge(self._truth, patches.areas, parts)
 
     def solving(self, settings: BakeSettings):
@@ -74,7 +75,7 @@ class _System:
 
     def _judged(self, solution):
         stated = None
-        if solution.standard_errors is not None:
+        if solution.standard_errors is not None and self._is_at_each:  # it is one of each patch, not of means
             deviation = self._arriving(solution.standard_errors + self._emitted)
             stated = relative_error(self._truth + deviation, self._truth, self._patches.areas)
         return Outcome(self._error_of(self._arriving(solution.radiosity)), solution.rays, stated)
@@ -111,17 +112,20 @@ def bake_rows(exact: ExactScene, threads: int, is_quick: bool, runs: int, seed: 
                 method=method, solver=solver, error=error, texels=QUICK_TEXELS if is_quick else TEXELS, threads=threads
             )
             names = ("bake", exact.name, method, solver, f"error {error:g}")
-            yield measured(names, runs, _baking(exact.scene, settings, seed, triangles, barycentrics, error_of))
+            yield measured(
+                names, runs, _baking(exact.scene, settings, seed, triangles, barycentrics, error_of, parts is None)
+            )
 
 
-def _baking(scene, settings, seed, triangles, barycentrics, error_of):
+def _baking(scene, settings, seed, triangles, barycentrics, error_of, states_points):
     def run(turn):
         result = bake(scene, replace(settings, seed=seed + turn))
 
         def judge():
             found = look_up(result.lightmap, triangles, barycentrics) @ LUMINANCE
             report = result.report.with_stages({})
-            return Outcome(error_of(found), sum(report.rays.values()), report.seen_error, report.seconds["bake"])
+            stated = report.seen_error if states_points else None
+            return Outcome(error_of(found), sum(report.rays.values()), stated, report.seconds["bake"])
 
         return judge
 
