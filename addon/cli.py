@@ -16,6 +16,7 @@ import sys
 import time
 from pathlib import Path
 
+from .cli_bench import add_bench
 from .core.settings import METHODS, SOLVERS, TARGETS, BakeCancelled, BakeSettings, SettingsError
 from .progress import ProgressBar
 
@@ -80,6 +81,7 @@ def parser() -> argparse.ArgumentParser:
     picture.add_argument("--lightmap", type=Path, metavar="OUT.png", help="the lightmap itself, too, to look at")
     picture.set_defaults(run=run_picture)
     _add_verify(commands)
+    add_bench(commands)
     return top
 
 
@@ -153,7 +155,7 @@ def run_bake(args: argparse.Namespace) -> None:
         raise CommandError("--exr writes the lightmap: it needs --target lightmap")
     output = args.output or args.input.with_name(f"{args.input.stem}_baked.blend")
     seconds: dict[str, float] = {}
-    with _blender() as bpy, ProgressBar() as progress:
+    with with_blender() as bpy, ProgressBar() as progress:
         from .blender import bake_scene, files
         from .core.bake import bake
 
@@ -181,7 +183,7 @@ def run_bake(args: argparse.Namespace) -> None:
 
 def run_demo(args: argparse.Namespace) -> None:
     """``patchlight demo``: the demo scenes as .blend files."""
-    with _blender():
+    with with_blender():
         from .blender import demo
 
         paths = demo.save_demo(args.folder)
@@ -191,7 +193,7 @@ def run_demo(args: argparse.Namespace) -> None:
 
 def run_picture(args: argparse.Namespace) -> None:
     """``patchlight picture``: a PNG of a baked .blend in which nothing but the bake gives light."""
-    with _blender() as bpy:
+    with with_blender() as bpy:
         from .blender import files, picture
 
         for path in (args.output, args.lightmap):
@@ -271,7 +273,7 @@ def _tell(source, output, report):
 
 
 @contextlib.contextmanager
-def _blender():
+def with_blender():
     """Blender's module, silent on stdout (it tells every file that it opens), with Ctrl-C as Python has it."""
     with _silent_stdout():
         try:

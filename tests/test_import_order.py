@@ -19,6 +19,8 @@ CORE_ORDER = (
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
     *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides", "radiosity"),
     *("charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing", "probes", "gather", "lightmap", "bake"),
+    *("peak_memory", "bench_row", "bench_cube", "bench_scenes", "bench_peers", "bench_factors", "bench_light", "bench"),
+    "bench_plot",
 )
 BLENDER = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "idprop"}
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .analytic import Surface, exchange, exchanges
-from .polygon import polygon_area
+from .polygon import distinct_corners, polygon_area
 
 PANEL_ERROR = 1e-3  # relative, of factors of flat panels for curved bodies: it falls with the square of their size
 
@@ -48,11 +48,7 @@ class Body:
 
     def surface(self) -> Surface:
         """The body as a surface of many pieces."""
-        return Surface(self.name, tuple(_distinct(panel) for ring in self.rings for panel in ring.panels))
-
-
-def _distinct(panel):
-    return panel[(panel != np.roll(panel, 1, axis=0)).any(axis=1)]
+        return Surface(self.name, tuple(distinct_corners(panel) for ring in self.rings for panel in ring.panels))
 
 
 def equal_area_radius(radius: float, sides: int) -> float:
@@ -98,7 +94,7 @@ def ring_exchange(first: Ring, second: Ring) -> float:
         first, second = second, first
     # of two rings that turn together one panel stands for all; a single polygon is turned into itself
     if len(first.panels) == 1 and len(second.panels) > 1:
-        return len(second.panels) * exchange(first.panels[0], _distinct(second.panels[0]))
+        return len(second.panels) * exchange(first.panels[0], distinct_corners(second.panels[0]))
     return len(first.panels) * float(exchanges(first.panels[0], second.panels).sum())
 
 

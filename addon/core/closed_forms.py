@@ -1,4 +1,4 @@
-"""Closed forms of form factors and radiosities, for the cases that are shipped.
+"""Closed forms of form factors and radiosities, for the cases that are shipped; of rectangles also many at once.
 
 Howell: J. R. Howell, A Catalog of Radiation Heat Transfer Configuration Factors, the numbers are its.
 """
@@ -30,7 +30,7 @@ def perpendicular_rectangles(x, y, xi, eta) -> float:
 
 def _perpendicular_term(squared, v):
     root, whole = np.sqrt(squared), squared + v * v
-    logarithm = np.log(whole) if whole > 0 else 0.0
+    logarithm = np.log(np.where(whole > 0, whole, 1.0))
     return v * root * np.arctan2(v, root) - 0.25 * (squared - v * v) * logarithm
 
 

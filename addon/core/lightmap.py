@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .charts import Charts
-from .scene import radiance_from_exitance
+from .scene import exitance_from_radiance, radiance_from_exitance
 from .texels import TexelMap
 
 RINGS = 2  # around the charts that are filled by the mean of their neighbours; the rest coarse to fine
@@ -37,6 +37,23 @@ def assemble(irradiance: np.ndarray, texel_map: TexelMap, charts: Charts) -> Lig
         is_set = _dilate(pixels, is_set)
     _fill(pixels, is_set)
     return Lightmap(pixels, charts.uvs / np.float32([charts.width, charts.height]))
+
+
+def look_up(lightmap: Lightmap, triangles, barycentrics):
+    """Irradiance (N, 3) [W/m^2] that a viewer finds at points of triangles (N,), by barycentrics (N, 3)."""
+    uvs = np.einsum("nk,nkc->nc", barycentrics, lightmap.uvs[triangles])
+    return exitance_from_radiance(bilinear(lightmap.pixels, uvs))
+
+
+def bilinear(pixels, uvs):
+    """An image's values (N, C) at UVs (N, 2), between the middles of its pixels; clamped at its border."""
+    height, width = pixels.shape[:2]
+    places = np.clip(uvs * (width, height) - 0.5, 0, (width - 1, height - 1))
+    low = np.minimum(places.astype(np.int64), np.maximum((width - 2, height - 2), 0))
+    (x, y), (right, up) = (places - low).T[:, :, None], np.minimum(low + 1, (width - 1, height - 1)).T
+    left, down = low.T
+    below = (1 - x) * pixels[down, left] + x * pixels[down, right]
+    return (1 - y) * below + y * ((1 - x) * pixels[up, left] + x * pixels[up, right])
 
 
 def _dilate(pixels, is_set):

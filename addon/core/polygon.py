@@ -16,6 +16,11 @@ def area_vector(corners):
     return 0.5 * np.cross(relative, np.roll(relative, -1, axis=-2)).sum(axis=-2)
 
 
+def distinct_corners(corners):
+    """A polygon (K, 3) without corners that repeat the one before."""
+    return corners[(corners != np.roll(corners, 1, axis=0)).any(axis=1)]
+
+
 def polygon_area(corners) -> float:
     """Area of a planar polygon (K, 3) [m^2]."""
     return float(np.linalg.norm(area_vector(corners)))

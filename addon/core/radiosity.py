@@ -112,7 +112,7 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     )
     daylight, sky_rays = _sky_on_patches(scene, kernel, patches, emitters, sky, settings.seed)
     emitted = patches.side_reflectance * (direct + daylight)
-    solution = _solve(kernel, patches, emitted, solver, method, settings, lambda done: on_step(0.5 + 0.5 * done))
+    solution = solve_patches(kernel, patches, emitted, solver, method, settings, lambda done: on_step(0.5 + 0.5 * done))
 
     kinds, bright = _side_kinds(patches, solution.radiosity, spread)
     field = PatchSolution(
@@ -177,7 +177,8 @@ def _as_sources(scene, kernel, patches, emitters, radiosity, bright):
     )
 
 
-def _solve(kernel, patches, emitted, solver, method, settings, on_step) -> Solution:
+def solve_patches(kernel, patches, emitted, solver, method, settings, on_step) -> Solution:
+    """Radiosity of all sides from what they emit, float64 (2 P, 3) [W/m^2], by a named solver and method."""
     areas, reflectance = patches.side_areas, np.minimum(patches.side_reflectance, MOST_REFLECTANCE)
     if solver == "stochastic":
         rays = int(min(max(8 * len(emitted), 1 << 20) * (0.05 / settings.error), 1 << 25))
