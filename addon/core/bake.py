@@ -105,9 +105,10 @@ def _require_targets(sound: SoundFaces) -> None:
 def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap) -> Report:
     warnings = list(scene.warnings)
     if not irradiance.target_reached:
+        is_late = settings.time_limit is not None and progress.elapsed > settings.time_limit
         warnings.append(
             f"the target error {settings.error:g} was not reached: sampling stopped at an estimated "
-            f"{irradiance.relative_error:.3g}" + (" by the time limit" if settings.time_limit else "")
+            f"{irradiance.relative_error:.3g}" + (" by the time limit" if is_late else "")
         )
     if (solved.patches.reflectance > MOST_REFLECTANCE).any():
         warnings.append(

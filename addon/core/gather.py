@@ -23,9 +23,10 @@ FAR = 3.3  # times as far do rays go on from patches, where texels have a light 
 FIRST_RAYS = 8  # of a replicate, in the first pass
 GROWTH = 4  # every further pass brings those that need it to so many times as many
 MOST_RAYS = 2048  # of a replicate
-MOST_COST = 3  # times the rays of the first pass that all passes may take, and FREE_RAYS at least
+MOST_COST = 3  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
-DIRECT_PASSES = 3  # each with four times the shadow rays of the one before, for the receivers that need it
+USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
+DIRECT_PASSES = 2  # each with four times the shadow rays of the one before, for the receivers that need it
 DIRECT_SHARE = 0.5  # of the error that direct light may have
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
@@ -196,7 +197,7 @@ def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, is_late,
         width = 0.5 * (1 - begin)
         rays += _gather_pass(job, active, taken, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
         begin += width
-        budget = budget or max(MOST_COST * rays, FREE_RAYS)
+        budget = budget or int(max(MOST_COST * rays, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
         values, relative, rms = _best_estimate(job, grid, sums / taken[:, None, None], direct, chosen, probes)
         # once the whole is good enough, only what would show as a speckle goes on
         active = np.flatnonzero(relative > (error if rms > error else 2 * error))
