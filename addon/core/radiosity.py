@@ -37,8 +37,7 @@ MOST_REFLECTANCE = 0.9999  # while light is solved for: in a closed room that ab
 MIXED = 0.5  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
 BRIGHT = 20.0  # times the median radiosity: brighter sides are sampled as lights, which few gather rays would find
 BRIGHT_SHARE = 0.005  # of all area that they may be: where much is bright, gather rays find it well
-BRIGHT_FLUX = 0.1  # of all flux that they must send out where there are more than FEW: every receiver pays for them
-FEW = 128  # sides
+BRIGHT_FLUX = 0.1  # of all flux that they must send out: every receiver and every near hit pays for them
 CONFINED = 0.5  # a side of which fewer rays leave its reach lies in a gap
 OPENNESS_RAYS = 8
 REACH = 3.0  # patch sizes: nearer hits go on from the point hit
@@ -138,7 +137,7 @@ def _side_kinds(patches, radiosity, spread):
     is_bright = (luminance > BRIGHT * typical) & (spread <= MIXED) & (patches.side_areas > 0)
     is_bright &= _brightest(luminance, patches.side_areas, BRIGHT_SHARE)
     flux = luminance * patches.side_areas
-    if np.count_nonzero(is_bright) > FEW and flux[is_bright].sum() < BRIGHT_FLUX * flux.sum():
+    if flux[is_bright].sum() < BRIGHT_FLUX * flux.sum():
         is_bright[:] = False
     is_mixed = spread > MIXED
     return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
