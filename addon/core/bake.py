@@ -75,7 +75,7 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
         progress.begin("gather")
         irradiance = gather_irradiance(
             kernel, solved, receivers, grid, seen, settings.error, settings.seed,
-            lambda: settings.time_limit is not None and progress.elapsed > settings.time_limit, progress.step,
+            lambda: np.inf if settings.time_limit is None else settings.time_limit - progress.elapsed, progress.step,
         )  # fmt: skip
 
         progress.begin("texels")
@@ -105,10 +105,9 @@ def _require_targets(sound: SoundFaces) -> None:
 def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap) -> Report:
     warnings = list(scene.warnings)
     if not irradiance.target_reached:
-        is_late = settings.time_limit is not None and progress.elapsed > settings.time_limit
         warnings.append(
             f"the target error {settings.error:g} was not reached: sampling stopped at an estimated "
-            f"{irradiance.relative_error:.3g}" + (" by the time limit" if is_late else "")
+            f"{irradiance.relative_error:.3g} {irradiance.stopped}".rstrip()
         )
     if (solved.patches.reflectance > MOST_REFLECTANCE).any():
         warnings.append(

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from .peak_memory import PeakMemory
-from .probes import DARK
+from .relative import DARK
 
 LONG = 2.0  # a run that takes longer is not repeated [s]
 HEADER = (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,27 +10,34 @@ import numpy as np
 from .emitters import LUMINANCE
 from .guides import Guides, learn_guides, no_guides
 from .kernel import KernelScene
-from .probes import Measured, SeenPoints, chosen_receivers, scale_of
+from .probes import Measured, SeenPoints, chosen_receivers
 from .radiosity import Solved
 from .receivers import Receivers
+from .relative import scale_of
 from .smoothing import TexelGrid, smoothed
 from .texel_light import NO_TEXEL_LIGHT, TexelLight
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
-LOOK_RAYS = 4  # of a replicate, for the first look at the texels' light, which further rays then see
+LOOK_RAYS = 2  # of a replicate, for the first look at the texels' light, which further rays then see
 NEAR = 10.0  # texels: rays that hit from nearer do not take a texel's light
 NEAR_SHARE = 1 / 16  # of the scene, at the most: in a coarse lightmap all would be near
 FAR = 3.3  # times as far do rays go on from patches, where texels have a light of their own: few are left that need it
-FIRST_RAYS = 8  # of a replicate, in the first pass
-GROWTH = 4  # every further pass brings those that need it to so many times as many
+FIRST_RAYS = 2  # of a replicate, in the first pass, on MANY_TEXELS and more, whose neighbours vouch for them;
+FIRST_ALONE = 8  # elsewhere: fewer may miss what is bright and small, and not know it
+MANY_TEXELS = 1 << 16
+LEAST_GROWTH, MOST_GROWTH = 3, 15  # times the rays that a receiver has, that a further pass adds
 MOST_RAYS = 2048  # of a replicate
-MOST_COST = 3  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
+MOST_COST = 12  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
+WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
+MOST_IDLE = 2  # the noise
+ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 DIRECT_PASSES = 2  # each with four times the shadow rays of the one before, for the receivers that need it
 DIRECT_SHARE = 0.5  # of the error that direct light may have
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
+MOST_PROBE_RAYS = 2048  # of a replicate, at probes that fewer leave more uncertain than the error aimed at
 FURTHER = 2.0  # seen points look so many times further before they take a texel's or a patch's light for what is there
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
 
@@ -43,7 +51,8 @@ class Irradiance:
     values : float32 (N, 3) E [W/m^2]
     relative_error : estimated RMS over receivers of the error over (E + 0.3 median E), luminance
     seen_error : the same at random points of the surfaces, looked up in the result as a viewer does
-    target_reached : whether sampling met its target within the time limit and its budget of rays
+    target_reached : whether sampling met its target
+    stopped : what ended it, "" where nothing was left to do
     rays : {"direct": shadow rays, "gather": rays, "probe": rays that measure the error}
     """
 
@@ -51,6 +60,7 @@ class Irradiance:
     relative_error: float
     seen_error: float
     target_reached: bool
+    stopped: str
     rays: dict[str, int]
 
 
@@ -111,7 +121,7 @@ def gather_irradiance(
     seen: SeenPoints,
     error: float,
     seed: int,
-    is_late,
+    seconds_left,
     on_step,
 ) -> Irradiance:
     """Direct plus gathered irradiance at receivers, and how wrong it is.
@@ -122,11 +132,11 @@ def gather_irradiance(
     grid : the texels that the receivers are, over which gathered light is smoothed; None = no smoothing
     seen : random points of the surfaces, at which the result is looked up
     error : target of the relative error of every receiver [1]
-    is_late : () -> bool, whether the time limit has passed; the first pass is always finished
+    seconds_left : () -> float, until the time limit [s]; the first pass is always finished
     on_step : (0..1) -> None
     """
     if not len(receivers):
-        return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, {"direct": 0, "gather": 0})
+        return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", {"direct": 0, "gather": 0})
     job = _Job(kernel, solved, receivers, no_guides(len(receivers)))
     direct, shadow_rays = _direct_until(job, error, seed, lambda done: on_step(0.25 * done))
     looks = 0
@@ -136,11 +146,11 @@ def gather_irradiance(
     job = replace(job, guides=guides)
     chosen = chosen_receivers(len(receivers))
     probes = _measure(job.part(chosen), error, seed + 1)
-    values, rms, rays, in_time = _gather_until(job, grid, direct, chosen, probes, error, seed, is_late, on_step)
+    values, rms, rays, stopped = _gather_until(job, grid, direct, chosen, probes, error, seed, seconds_left, on_step)
     at_points = _measure(
         replace(job, receivers=seen.receivers, guides=no_guides(len(seen.receivers))).looking_further(FURTHER),
         error,
-        seed + 4,
+        seed + 5,
     )
     shown = seen.look_up(values)
     traced = {
@@ -148,7 +158,7 @@ def gather_irradiance(
         "gather": looks + learning + rays,
         "probe": probes.rays + at_points.rays,
     }
-    return Irradiance(values, rms, at_points.error_of(shown, scale_of(shown)), in_time and rms <= error, traced)
+    return Irradiance(values, rms, at_points.error_of(shown, scale_of(shown)), rms <= error, stopped, traced)
 
 
 def _with_texel_light(job: _Job, grid: TexelGrid, direct, seed, on_step):
@@ -162,14 +172,24 @@ def _with_texel_light(job: _Job, grid: TexelGrid, direct, seed, on_step):
 
 
 def _measure(job: _Job, error, seed) -> Measured:
-    """The light at a job's receivers, with many rays."""
-    direct, variance, shadow_rays = job.direct(4 * shadow_samples(error), seed)
-    sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
+    """The light at a job's receivers, with many rays, and with more where that is not enough to judge by."""
+    direct, variance, rays = job.direct(4 * shadow_samples(error), seed)
     count = probe_rays(error)
+    gathered, noise, traced = _gathered(job, count, seed)
+    values, scale, rays = gathered.mean(axis=1) + direct, scale_of(direct + gathered.mean(axis=1)), rays + traced
+    noisy = np.flatnonzero(np.sqrt(noise) > scale * error)
+    if len(noisy):
+        again, less_noise, traced = _gathered(job.part(noisy), MOST_PROBE_RAYS, seed + 1)
+        values[noisy], noise[noisy], rays = again.mean(axis=1) + direct[noisy], less_noise, rays + traced
+    return Measured(values @ LUMINANCE, variance + noise, rays)
+
+
+def _gathered(job: _Job, count, seed):
+    """Means of ``count`` rays of each replicate (N, R, 3), variance of their mean's luminance (N,), the rays."""
+    sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
     rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, count, seed, sums)
-    gathered = (sums / count) @ LUMINANCE
-    variance = variance + gathered.var(axis=1, ddof=1) / REPLICATES
-    return Measured(direct @ LUMINANCE + gathered.mean(axis=1), variance, shadow_rays + rays)
+    means = sums / count
+    return means, (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES, rays
 
 
 def _direct_until(job: _Job, error, seed, on_step):
@@ -187,58 +207,72 @@ def _direct_until(job: _Job, error, seed, on_step):
     return direct, rays
 
 
-def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, is_late, on_step):
-    """Irradiance (N, 3), its relative RMS error, the rays, and whether the time limit let all passes be made."""
+def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, seconds_left, on_step):
+    """Irradiance (N, 3), its relative RMS error, the rays, and what stopped it ("" = nothing more to do)."""
     count = len(job.receivers)
     sums, taken = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64)
-    active, rays, budget, begin = np.arange(count, dtype=np.uint32), 0, 0, 0.4
+    active, further = (
+        np.arange(count, dtype=np.uint32),
+        np.full(count, FIRST_RAYS if grid and count >= MANY_TEXELS else FIRST_ALONE),
+    )
+    rays, budget, idle, begin, rms, started = 0, 0, 0, 0.4, np.inf, time.perf_counter()
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
-        rays += _gather_pass(job, active, taken, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
+        rays += _gather_pass(job, active, taken, further, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
         begin += width
         budget = budget or int(max(MOST_COST * rays, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
+        before = rms
         values, relative, rms = _best_estimate(job, grid, sums / taken[:, None, None], direct, chosen, probes)
+        idle = idle + 1 if rms > max(error, WORTH_IT * before) else 0
+        if idle == MOST_IDLE:
+            return values, rms, rays, "as further rays no longer help"
+
         # once the whole is good enough, only what would show as a speckle goes on
         active = np.flatnonzero(relative > (error if rms > error else 2 * error))
         if not len(active) and rms > error:
             active = np.arange(count)
-        active = _affordable(active[taken[active] < MOST_RAYS], relative, taken, budget - rays)
-        if not len(active):
-            return values, rms, rays, True
-        if is_late():
-            return values, rms, rays, False
+        active = active[taken[active] < MOST_RAYS]
+        further = _further_rays(taken, relative / error)
+        in_time = seconds_left() * rays / (time.perf_counter() - started)
+        cost = rays / (REPLICATES * int(taken.sum()))
+        wanted = len(active)
+        active = _affordable(active, relative, REPLICATES * cost * further, min(budget - rays, in_time))
+        if len(active) < ENOUGH * wanted or not wanted:
+            reason = "by the time limit" if in_time < budget - rays else "by the budget of rays"
+            return values, rms, rays, reason if wanted else ""
 
 
-def _gather_pass(job: _Job, active, taken, seed, sums, on_step) -> int:
-    """Bring receivers to GROWTH times the rays they have, each going on in its own sequence; the rays traced."""
+def _further_rays(taken, excess):
+    """Rays of a replicate that the next pass adds, from those taken and how many times too large the error is."""
+    wanted = np.clip(excess**2 - 1, LEAST_GROWTH, MOST_GROWTH) * taken
+    # a power of two: neighbours share its even spread
+    return 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
+
+
+def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:
+    """Add further rays to the active receivers; the rays traced."""
     rays, done = 0, 0
-    for first in np.unique(taken[active]):
-        group = np.ascontiguousarray(active[taken[active] == first], np.uint32)
+    for first, count in np.unique(np.stack([taken[active], further[active]], axis=1), axis=0):
+        group = active[(taken[active] == first) & (further[active] == count)]
         start, share = done / len(active), len(group) / len(active)
         rays += job.gather(
-            group,
+            np.ascontiguousarray(group, np.uint32),
             int(first),
-            _next_rays(first),
+            int(count),
             seed,
             sums,
             lambda part: on_step(start + share * part),  # noqa: B023
         )
         done += len(group)
-    taken[active] += _next_rays(taken[active])
+    taken[active] += further[active]
     return rays
 
 
-def _next_rays(taken):
-    """Rays of a replicate that the next pass adds."""
-    return np.maximum((GROWTH - 1) * taken, FIRST_RAYS)
-
-
-def _affordable(active, relative, taken, rays_left):
+def _affordable(active, relative, costs, rays_left):
     """Those of the receivers that a pass can afford, the noisiest first; in order."""
     noisiest = active[np.argsort(-relative[active], kind="stable")]
-    costs = np.cumsum(REPLICATES * _next_rays(taken[noisiest]))
-    return np.sort(noisiest[costs <= rays_left])
+    return np.sort(noisiest[np.cumsum(costs[noisiest]) <= rays_left])
 
 
 def _best_estimate(job, grid, means, direct, chosen, probes):

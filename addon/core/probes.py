@@ -19,7 +19,6 @@ from .scene import Scene
 from .texels import TexelMap
 
 PROBES = 2048
-DARK = 0.3  # of the median irradiance: what is added to a point's own before its error is called relative
 MOST_OF_OBJECT = 0.25  # of the seen points that lie on one object: a ground plane must not take all
 
 
@@ -57,13 +56,6 @@ class Measured:
         squares = np.minimum(((values @ LUMINANCE - self.luminance) / scale) ** 2, 1.0)
         squares = squares - np.minimum(self.variance / scale**2, 1.0)
         return float(np.sqrt(max(squares.mean(), 0.0))) if len(squares) else 0.0
-
-
-def scale_of(irradiance):
-    """What an error is relative to: the luminance, and a share of its median where that is dark, (N,) [W/m^2]."""
-    luminance = irradiance @ LUMINANCE
-    lit = luminance[luminance > 1e-4 * max(luminance.mean(), 1e-30)]
-    return luminance + DARK * (np.median(lit) if len(lit) else 1.0)
 
 
 def chosen_receivers(count: int):

@@ -113,13 +113,14 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     emitted = patches.side_reflectance * (direct + daylight)
     solution = solve_patches(kernel, patches, emitted, solver, method, settings, lambda done: on_step(0.5 + 0.5 * done))
 
-    kinds, bright = _side_kinds(patches, solution.radiosity, spread)
+    reaches = _reaches(kernel, patches, settings.seed)
+    kinds, bright = _side_kinds(patches, solution.radiosity, spread, np.isinf(reaches))
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),
         direct=(patches.side_reflectance * direct).astype(np.float32),
         reflectance=np.ascontiguousarray(patches.reflectance, np.float32),
         kinds=kinds,
-        reaches=_reaches(kernel, patches, settings.seed),
+        reaches=reaches,
         sky=sky,
     )
     sources = _as_sources(scene, kernel, patches, emitters, solution.radiosity, bright)
@@ -128,15 +129,19 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     )
 
 
-def _side_kinds(patches, radiosity, spread):
-    """The kind of each side, uint8 (2 P,), and which sides are LIGHT."""
+def _side_kinds(patches, radiosity, spread, is_confined):
+    """The kind of each side, uint8 (2 P,), and which sides are LIGHT.
+
+    What shines in a gap, between a lamp and the ceiling that it hangs from, lights next to nothing but the gap.
+    """
     luminance = radiosity @ LUMINANCE
     lit = np.flatnonzero((luminance > 0) & (patches.side_areas > 0))
     typical = _weighted_median(luminance[lit], patches.side_areas[lit]) if len(lit) else 0.0
     spread = spread * patches.side_reflectance.mean(axis=1) / (luminance + typical + 1e-300)
     is_bright = (luminance > BRIGHT * typical) & (spread <= MIXED) & (patches.side_areas > 0)
     is_bright &= _brightest(luminance, patches.side_areas, BRIGHT_SHARE)
-    flux = luminance * patches.side_areas
+    is_bright &= ~is_confined
+    flux = luminance * patches.side_areas * ~is_confined
     if flux[is_bright].sum() < BRIGHT_FLUX * flux.sum():
         is_bright[:] = False
     is_mixed = spread > MIXED

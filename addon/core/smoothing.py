@@ -14,6 +14,7 @@ from .charts import Charts
 from .emitters import LUMINANCE
 from .kernel import smooth
 from .receivers import Receivers
+from .relative import scale_of
 from .scene import Scene
 from .texels import TexelMap
 from .textures import textured_colours
@@ -45,8 +46,9 @@ def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Rec
     """The grid that a lightmap's receivers lie in."""
     grid = np.full((texel_map.height, texel_map.width), -1, np.int32)
     grid[texel_map.rows, texel_map.columns] = np.arange(len(texel_map))
-    beside = (np.diff(texel_map.rows) == 0) & (np.diff(texel_map.columns) == 1)
-    apart = np.linalg.norm(np.diff(receivers.positions, axis=0)[beside], axis=1)
+    beside = (grid[:, :-1] >= 0) & (grid[:, 1:] >= 0)
+    left, right = receivers.positions[grid[:, :-1][beside]], receivers.positions[grid[:, 1:][beside]]
+    apart = np.linalg.norm(right - left, axis=1)
     apart = apart[apart > 0]
     spacing = float(np.median(apart)) if len(apart) else 1.0
     colours = textured_colours(scene, texel_map.triangles, texel_map.barycentrics, "reflectance", "reflectance_texture")
@@ -58,9 +60,12 @@ def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means):
     values = means.mean(axis=1, dtype=np.float32)
     variances = (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]
     variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
-    # a few replicates alone say little of one texel's noise: pool them over the neighbours
-    pooled, _ = smooth(workers, grid, receivers, np.repeat(variances[:, None], 3, axis=1), variances, 1, False)
-    noise = np.ascontiguousarray(pooled[:, 0])
+    # a few replicates alone say little of one texel's noise: pool them over the neighbours, relative to the light
+    # there, as the noise of what is bright says nothing of the calm beside it
+    scales = scale_of(smooth(workers, grid, receivers, values, variances, 1, False)[0])
+    relative = np.minimum(variances / scales**2, LARGEST_VARIANCE).astype(np.float32)
+    pooled, _ = smooth(workers, grid, receivers, np.repeat(relative[:, None], 3, axis=1), variances, 1, False)
+    noise = np.minimum(pooled[:, 0] * scales**2, LARGEST_VARIANCE).astype(np.float32)
     for step in STEPS:
         values, noise = smooth(workers, grid, receivers, values, noise, step, True)
     return values, noise

@@ -13,7 +13,7 @@ from .scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class TexelMap:
-    """Receivers, row by row.
+    """Receivers, along a Z-shaped curve through the lightmap: those that follow each other are near on the surface.
 
     A texel is a receiver where the square over which bilinear lookup spreads it meets a chart; it stands for its own
     centre, or where that is outside, for the chart's nearest point.
@@ -43,6 +43,8 @@ def texels(scene: Scene, charts: Charts) -> TexelMap:
     """The receivers of a lightmap: inside wins over outside, then near over far, then the lower triangle."""
     triangles, distances, barycentrics = kernel.rasterise_texels(charts.uvs, charts.width, charts.height)
     rows, columns = np.nonzero(triangles >= 0)
+    order = np.argsort(_spread_bits(rows) << np.uint64(1) | _spread_bits(columns))
+    rows, columns = rows[order], columns[order]
     return TexelMap(
         rows.astype(np.int32),
         columns.astype(np.int32),
@@ -52,3 +54,17 @@ def texels(scene: Scene, charts: Charts) -> TexelMap:
         charts.width,
         charts.height,
     )
+
+
+def _spread_bits(x):
+    """The bits of x to every second place (Morton 1966)."""
+    x = x.astype(np.uint64)
+    for shift, mask in (
+        (16, 0x0000FFFF0000FFFF),
+        (8, 0x00FF00FF00FF00FF),
+        (4, 0x0F0F0F0F0F0F0F0F),
+        (2, 0x3333333333333333),
+        (1, 0x5555555555555555),
+    ):
+        x = (x | x << np.uint64(shift)) & np.uint64(mask)
+    return x

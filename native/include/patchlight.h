@@ -279,10 +279,11 @@ pl_status pl_learn_guides(const pl_gather_scene *in, const pl_receivers *receive
  * Irradiance by gathering: the mean radiosity that cosine rays see (final gather).
  *
  *   guides         where rays are drawn from
- *   selected       count indices into the receivers; the sequence of a receiver hangs on its index only
+ *   selected       count indices into the receivers; a receiver's rays hang on its index only
  *   replicates     independent randomisations, 1..PL_MAX_REPLICATES; their spread is the error estimate
- *   first, count   each replicate takes points first .. first + count - 1 of its Sobol sequence; powers
- *                  of two are best
+ *   first, count   rays of each replicate, after the first ones that it already has. One scrambled Sobol sequence goes
+ *                  through all receivers, count points each: receivers that follow each other share its even spread,
+ *                  so that their mean is better than any of them (Ahmed & Wonka 2020, sec. 4)
  *   io_sums        3 * replicates per selected receiver's index: sums of radiosity over rays, added to
  *   out_rays       all rays traced, shadow rays and those that went on included
  */
@@ -353,7 +354,8 @@ pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t
  *   values          3 per receiver
  *   variances       1 per receiver, of their luminance
  *   step            texels between the 5 x 5 taps: 1, 2, 4 ... for successive levels
- *   stops_on_value  0: geometry alone decides
+ *   stops_on_value  0: geometry alone decides; else values further apart than their noise explains are not mixed, and
+ *                   the noisier of two counts for four times the other's noise at the most
  *   first_row, row_count  the range
  *   out_values, out_variances  at the receivers' indices; the variance of the weighted mean
  */

@@ -201,9 +201,10 @@ pl_status pl_gather(const pl_gather_scene *in, const pl_receivers *receivers, co
         vec3 u, v;
         vec3_basis(frame.shading, &u, &v);
         for (uint32_t replicate = 0; replicate < rays.replicates; ++replicate) {
-            const uint32_t seed = hash_pair(hash_pair(rays.seed, replicate), selected[i]);
+            const uint32_t seed = hash_pair(hash_pair(rays.seed, replicate), hash_pair(rays.first, rays.count));
             float *sum = io_sums + 3 * ((size_t)selected[i] * rays.replicates + replicate);
-            for (uint32_t k = rays.first; k < rays.first + rays.count; ++k) {
+            for (uint32_t j = 0; j < rays.count; ++j) {
+                const uint32_t k = selected[i] * rays.count + j;
                 float x = sobol(k, 0, seed), y = sobol(k, 1, seed), seen[3] = {0, 0, 0};
                 const float share = guide_warp(&by, &x, &y), weight[3] = {share, share, share};
                 gather_ray(&job, &frame, cosine_direction(x, y, u, v, frame.shading),

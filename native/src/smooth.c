@@ -30,16 +30,25 @@ static float geometric_weight(const smooth_job *job, size_t a, size_t b, float t
     /* a neighbour in the atlas that is further away in space than its texels are belongs to another chart */
     if (cosine < 0.9f || !(reach > 0) || vec3_dot(apart, apart) > 4 * reach * reach)
         return 0;
-    const float height = vec3_dot(apart, n) / reach;
+    const float height = vec3_dot(apart, n) / reach, steepness = 8 * height * height;
     const float square = cosine * cosine, fourth = square * square;
-    return fourth * fourth * expf(-8 * height * height);
+    return fourth * fourth * (steepness > 1e-6f ? expf(-steepness) : 1);
 }
 
-/* How far two values are the same but for their noise. */
+/*
+ * How far two values are the same but for their noise. Each counts for a few times the other's at the most, or what is
+ * bright and noisy (under a lamp that hangs off the ceiling) would spread over the calm texels beside it.
+ */
+static const float noisier = 4;
+/* Less leaves mottles, and much light on one side only of what is skewed; more washes out what light does at contacts.
+ */
+static const float tolerance = 7;
+
 static float value_weight(const smooth_job *job, size_t a, size_t b) {
     const float difference = luminance(job->values + CHANNELS * a) - luminance(job->values + CHANNELS * b);
-    const float noise = job->variances[a] + job->variances[b];
-    return noise > 0 ? expf(-difference * difference / (4 * noise)) : (difference == 0 ? 1.0f : 0.0f);
+    const float va = job->variances[a], vb = job->variances[b];
+    const float noise = fminf(va, noisier * vb) + fminf(vb, noisier * va);
+    return noise > 0 ? expf(-difference * difference / (tolerance * noise)) : (difference == 0 ? 1.0f : 0.0f);
 }
 
 static void smooth_texel(const smooth_job *job, int32_t row, int32_t column, size_t receiver, float *out_values,

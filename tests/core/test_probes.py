@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from addon.core.probes import MOST_OF_OBJECT, Measured, scale_of, seen_through_corners, seen_through_lightmap
+from addon.core.probes import MOST_OF_OBJECT, Measured, seen_through_corners, seen_through_lightmap
 from addon.core.receivers import vertex_receivers
+from addon.core.relative import scale_of
 from addon.core.settings import BakeSettings
 from addon.core.texels import texels
 from addon.core.unwrap import unwrap

@@ -1,0 +1,105 @@
+"""Smoothing: noise goes, what the light does stays."""
+
+import numpy as np
+import pytest
+
+from addon.core.kernel import smooth
+from addon.core.receivers import Receivers
+from addon.core.smoothing import TexelGrid, smoothed
+from addon.core.workers import Workers
+from tests.reference import smoothing as reference
+
+SIDE = 40
+SPACING = 0.01
+
+
+def wall(side=SIDE, heights=None, normals=None):
+    """A square of texels on z = 0, with where they are."""
+    grid = np.arange(side * side, dtype=np.int32).reshape(side, side)
+    y, x = np.divmod(np.arange(side * side), side)
+    z = np.zeros(side * side) if heights is None else heights
+    facing = np.tile(np.float32([0, 0, 1]), (side * side, 1)) if normals is None else normals
+    receivers = Receivers(SPACING * np.stack([x, y, z / SPACING], 1), facing, np.zeros(side * side, np.int32))
+    nowhere = np.full((1, 3, 2), np.nan, np.float32)
+    return TexelGrid(grid, SPACING, nowhere, np.ones((side * side, 3), np.float32)), receivers
+
+
+def noisy(light, deviation, seed=1):
+    """Four replicates (N, 4, 3) about the light (N,), grey."""
+    rng = np.random.default_rng(seed)
+    values = light[:, None] + deviation * rng.standard_normal((len(light), 4))
+    return np.repeat(values[..., None], 3, axis=2).astype(np.float32)
+
+
+def run(grid, receivers, means):
+    with Workers(2) as workers:
+        return smoothed(workers, grid, receivers, means)
+
+
+@pytest.mark.parametrize("step", [1, 4])
+@pytest.mark.parametrize("stops_on_value", [False, True], ids=["geometry", "value"])
+def test_a_level_is_what_its_definition_says(step, stops_on_value):
+    rng = np.random.default_rng(3)
+    side = 12
+    normals = np.float32([0, 0, 1]) + 0.3 * rng.standard_normal((side * side, 3)).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    grid, receivers = wall(side, 0.003 * rng.standard_normal(side * side), normals)
+    grid.receivers[rng.random((side, side)) < 0.2] = -1
+    values = rng.random((side * side, 3)).astype(np.float32)
+    variances = (0.05 * rng.random(side * side)).astype(np.float32)
+    with Workers(2) as workers:
+        found = smooth(workers, grid, receivers, values, variances, step, stops_on_value)
+    exact = reference.smooth(
+        grid.receivers, SPACING, receivers.positions, normals.astype(float), values, variances, step, stops_on_value
+    )
+    # 25 weights of float32, the exponents known to 1e-6 of at most some tens
+    assert found[0] == pytest.approx(exact[0], abs=3e-5)
+    assert found[1] == pytest.approx(exact[1], abs=3e-6)
+
+
+def test_noise_falls_by_what_so_many_texels_are_worth():
+    deviation = 0.05
+    grid, receivers = wall()
+    values, variances = run(grid, receivers, noisy(np.ones(SIDE * SIDE), 2 * deviation))
+    inner = grid.receivers[10:-10, 10:-10].ravel()
+    found = np.sqrt(np.mean((values[inner, 0] - 1) ** 2))
+    # the splines come to some 15 x 15 even texels; stops on value, which cannot tell all noise from light, leave half
+    assert found < deviation / 7.5
+    # what is stated takes neighbours for independent after every level, which they are not: probes tell how much more
+    assert 0 < np.sqrt(variances[inner].mean()) < found
+
+
+def test_a_step_above_the_noise_stays_and_one_below_may_go():
+    grid, receivers = wall()
+    edge = (np.arange(SIDE * SIDE) % SIDE >= SIDE // 2).astype(float)
+    values, _ = run(grid, receivers, noisy(1 + edge, 0.02))
+    beside = values.reshape(SIDE, SIDE, 3)[10:-10, SIDE // 2 - 1 : SIDE // 2 + 1, 0].mean(axis=0)
+    assert beside == pytest.approx([1, 2], abs=0.02)
+
+
+def test_bright_and_noisy_does_not_spread_over_calm():
+    """Texels under a lamp that hangs just off the ceiling: their light must not run out beside the lamp."""
+    grid, receivers = wall()
+    rows, columns = np.divmod(np.arange(SIDE * SIDE), SIDE)
+    is_hot = (abs(rows - SIDE / 2) < 5) & (abs(columns - SIDE / 2) < 5)
+    means = noisy(np.ones(SIDE * SIDE), 0.01)
+    means[is_hot] = noisy(np.full(is_hot.sum(), 30.0), 20.0, 2)
+    values, _ = run(grid, receivers, means)
+    # beside the hot ones, whose noise is pooled with theirs, some may come over
+    is_far = (abs(rows - SIDE / 2) > 8) | (abs(columns - SIDE / 2) > 8)
+    assert values[is_far, 0] == pytest.approx(1, abs=0.02)
+
+
+def test_creases_and_steps_stop_it():
+    """A floor that is folded up into a wall, and a shelf that hangs above it, all beside each other in the atlas."""
+    rows, columns = np.divmod(np.arange(SIDE * SIDE), SIDE)
+    is_wall, is_shelf = rows >= SIDE // 2, (rows < SIDE // 2) & (columns >= SIDE // 2)
+    normals = np.where(is_wall[:, None], np.float32([0, -1, 0]), np.float32([0, 0, 1]))
+    grid, receivers = wall(SIDE, np.where(is_wall, SPACING * (rows - SIDE // 2), 1.0 * is_shelf), normals)
+    receivers.positions[is_wall, 1] = SPACING * SIDE // 2
+    light = 1.0 + is_shelf + 2.0 * is_wall
+    means = np.repeat(np.repeat(light[:, None, None], 4, axis=1), 3, axis=2).astype(np.float32)
+    means[:, :2] += 10
+    means[:, 2:] -= 10  # so noisy that value stops nothing
+    values, _ = run(grid, receivers, means)
+    assert values[:, 0] == pytest.approx(light, abs=1e-4)

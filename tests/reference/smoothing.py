@@ -1,0 +1,48 @@
+"""One level of edge-stopping smoothing by its definition, float64 (Dammertz et al. 2010, eq. 7; B3 spline taps)."""
+
+import numpy as np
+
+SPLINE = np.array([1, 4, 6, 4, 1]) / 16
+
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def smooth(grid, spacing, positions, normals, values, variances, step, stops_on_value):
+    """Means of values (N, 3) weighted over the 5 x 5 taps ``step`` texels apart of a grid (H, W), and their variance."""
+    out, out_variances = np.zeros((len(values), 3)), np.zeros(len(values))
+    luminances = values @ LUMINANCE
+    for row, column in zip(*np.nonzero(grid >= 0)):
+        here = grid[row, column]
+        total = 0.0
+        for i, j in np.ndindex(5, 5):
+            y, x = row + step * (i - 2), column + step * (j - 2)
+            if not (0 <= y < grid.shape[0] and 0 <= x < grid.shape[1]) or grid[y, x] < 0:
+                continue
+            there = grid[y, x]
+            weight = SPLINE[i] * SPLINE[j]
+            if there != here:
+                reach = spacing * step * np.hypot(i - 2, j - 2)
+                weight *= _same_surface(positions[here], positions[there], normals[here], normals[there], reach)
+                if stops_on_value:
+                    noise = _common_noise(variances[here], variances[there])
+                    difference = (luminances[here] - luminances[there]) ** 2
+                    weight *= np.exp(-difference / (7 * noise)) if noise > 0 else float(difference == 0)
+            out[here] += weight * values[there]
+            out_variances[here] += weight**2 * variances[there]
+            total += weight
+        out[here] /= total
+        out_variances[here] /= total**2
+    return out, out_variances
+
+
+def _common_noise(a, b):
+    """Variance of the difference, in which the noisier counts for at most four times the other."""
+    return min(a, 4 * b) + min(b, 4 * a)
+
+
+def _same_surface(p, q, n, m, reach):
+    cosine, apart = n @ m, q - p
+    if cosine < 0.9 or apart @ apart > 4 * reach**2:
+        return 0.0
+    return cosine**8 * np.exp(-8 * (apart @ n / reach) ** 2)
