@@ -3,6 +3,7 @@
 # make fuzz   ten thousand random scenes baked whole (half an hour), and random calls of the kernel
 # make sanitize  the core's and the physics' tests over a kernel with address and undefined-behaviour checks
 # make bench  speed against error on exact scenes, quick settings: a table, and JSON and plots in out/bench
+# make bench-cycles SCENE=S.blend REFERENCE=S.npz  seconds and error beside Cycles' own bake of the same texels
 # make check  linters, formatters, C tests under sanitizers
 # make zip    the Blender extension, one zip per platform, validated
 # make clean  remove what these made (.venv stays; `make distclean` removes it too)
@@ -23,7 +24,7 @@ WARNINGS := -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Werror
 SANITIZE := -std=c11 -O1 -g -ffp-contract=off -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
 C_TESTS := $(patsubst tests/native/%.c,$(BUILD)/native/%,$(wildcard tests/native/test_*.c))
 
-.PHONY: bake test bench fuzz sanitize check lint native-tests kernel zip format clean distclean
+.PHONY: bake test bench bench-cycles fuzz sanitize check lint native-tests kernel zip format clean distclean
 .DELETE_ON_ERROR:
 
 # ---- set-up: each stamp is newer than what it was made from ----
@@ -71,6 +72,10 @@ test: kernel
 BENCH_OPTIONS := --quick
 bench: kernel
 	$(BIN)/patchlight bench --out $(OUT)/bench $(BENCH_OPTIONS)
+
+# CYCLES_OPTIONS= says which errors and samples, see tests/bench/cycles.py
+bench-cycles: kernel
+	$(BIN)/python tests/bench/cycles.py $(SCENE) $(REFERENCE) --out $(OUT)/bench $(CYCLES_OPTIONS)
 
 # every example is new at each run; what fails is printed with how to repeat it
 EXAMPLES := 10000

@@ -34,6 +34,7 @@ class Score:
         lit R: the reference's noise is taken out
     bias : mean of (E - R) / (R + 0.3 M), clipped to -1 ... 1
     missing : share of points without a baked value; each counts as r = 1
+    p50, p95 : quantiles of r
     noise : the reference's own, RMS of s / (R + 0.3 M)
     points : scored
     """
@@ -41,6 +42,8 @@ class Score:
     error: float
     bias: float
     missing: float
+    p50: float
+    p95: float
     noise: float
     points: int
 
@@ -71,6 +74,8 @@ def score(reference: dict[str, np.ndarray]) -> Score:
         error=float(np.sqrt(max(np.mean(signed**2) - noise, 0.0))),
         bias=float(signed.mean()),
         missing=float(1 - is_there.mean()),
+        p50=float(np.quantile(np.abs(signed), 0.5)),
+        p95=float(np.quantile(np.abs(signed), 0.95)),
         noise=float(np.sqrt(noise)),
         points=int(sure.sum()),
     )

@@ -18,26 +18,28 @@ from .smoothing import TexelGrid, smoothed
 from .texel_light import NO_TEXEL_LIGHT, TexelLight
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
-LOOK_RAYS = 2  # of a replicate, for the first look at the texels' light, which further rays then see
+LOOK_RAYS = 4  # of a replicate, for the first look at the texels' light, which further rays then see
 NEAR = 10.0  # texels: rays that hit from nearer do not take a texel's light
 NEAR_SHARE = 1 / 16  # of the scene, at the most: in a coarse lightmap all would be near
 FAR = 3.3  # times as far do rays go on from patches, where texels have a light of their own: few are left that need it
 FIRST_RAYS = 2  # of a replicate, in the first pass, on MANY_TEXELS and more, whose neighbours vouch for them;
 FIRST_ALONE = 8  # elsewhere: fewer may miss what is bright and small, and not know it
 MANY_TEXELS = 1 << 16
-LEAST_GROWTH, MOST_GROWTH = 3, 15  # times the rays that a receiver has, that a further pass adds
+GROWTH = 3  # times the rays that a receiver has, about, that a further pass adds
 MOST_RAYS = 2048  # of a replicate
-MOST_COST = 12  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
+MOST_COST = 15  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
+FAR_OFF = 1.5  # times the target: what smoothing leaves of the noise is not known well enough to choose by it
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
+MOST_EXTRA = 2  # passes after the target is met, each with some four times the rays: speckles are gone by then
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 DIRECT_PASSES = 2  # each with four times the shadow rays of the one before, for the receivers that need it
 DIRECT_SHARE = 0.5  # of the error that direct light may have
 MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
-MOST_PROBE_RAYS = 2048  # of a replicate, at probes that fewer leave more uncertain than the error aimed at
+MORE_RAYS, MOST_PROBE_RAYS = 16, 2048  # times as many, but not more, for probes more uncertain than the error aimed at
 FURTHER = 2.0  # seen points look so many times further before they take a texel's or a patch's light for what is there
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
 
@@ -179,7 +181,7 @@ def _measure(job: _Job, error, seed) -> Measured:
     values, scale, rays = gathered.mean(axis=1) + direct, scale_of(direct + gathered.mean(axis=1)), rays + traced
     noisy = np.flatnonzero(np.sqrt(noise) > scale * error)
     if len(noisy):
-        again, less_noise, traced = _gathered(job.part(noisy), MOST_PROBE_RAYS, seed + 1)
+        again, less_noise, traced = _gathered(job.part(noisy), min(MORE_RAYS * count, MOST_PROBE_RAYS), seed + 1)
         values[noisy], noise[noisy], rays = again.mean(axis=1) + direct[noisy], less_noise, rays + traced
     return Measured(values @ LUMINANCE, variance + noise, rays)
 
@@ -215,7 +217,7 @@ def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, seconds_
         np.arange(count, dtype=np.uint32),
         np.full(count, FIRST_RAYS if grid and count >= MANY_TEXELS else FIRST_ALONE),
     )
-    rays, budget, idle, begin, rms, started = 0, 0, 0, 0.4, np.inf, time.perf_counter()
+    rays, budget, idle, extra, begin, rms, started = 0, 0, 0, 0, 0.4, np.inf, time.perf_counter()
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
@@ -228,26 +230,30 @@ def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, seconds_
         if idle == MOST_IDLE:
             return values, rms, rays, "as further rays no longer help"
 
-        # once the whole is good enough, only what would show as a speckle goes on
+        # far from the target all go on, near it the noisy ones, once it is met only what would show as a speckle, and
+        # not for long
+        extra += rms <= error
+        if extra > MOST_EXTRA:
+            return values, rms, rays, ""
         active = np.flatnonzero(relative > (error if rms > error else 2 * error))
-        if not len(active) and rms > error:
+        if rms > FAR_OFF * error or (rms > error and not len(active)):
             active = np.arange(count)
         active = active[taken[active] < MOST_RAYS]
-        further = _further_rays(taken, relative / error)
+        further = _further_rays(taken)
         in_time = seconds_left() * rays / (time.perf_counter() - started)
         cost = rays / (REPLICATES * int(taken.sum()))
-        wanted = len(active)
-        active = _affordable(active, relative, REPLICATES * cost * further, min(budget - rays, in_time))
+        wanted, rays_left = len(active), min(budget - rays, in_time)
+        if REPLICATES * cost * further[active].sum() > rays_left:
+            further = np.maximum(further // 2, 1)  # fewer for all are worth more than all for some
+        active = _affordable(active, relative, REPLICATES * cost * further, rays_left)
         if len(active) < ENOUGH * wanted or not wanted:
             reason = "by the time limit" if in_time < budget - rays else "by the budget of rays"
             return values, rms, rays, reason if wanted else ""
 
 
-def _further_rays(taken, excess):
-    """Rays of a replicate that the next pass adds, from those taken and how many times too large the error is."""
-    wanted = np.clip(excess**2 - 1, LEAST_GROWTH, MOST_GROWTH) * taken
-    # a power of two: neighbours share its even spread
-    return 2 ** np.ceil(np.log2(wanted)).astype(np.int64)
+def _further_rays(taken):
+    """Rays of a replicate that the next pass adds: a power of two, so that neighbours share its even spread."""
+    return 2 ** np.ceil(np.log2(GROWTH * taken)).astype(np.int64)
 
 
 def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:

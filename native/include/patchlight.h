@@ -239,7 +239,7 @@ typedef struct pl_texel_light {
     float reach;
 } pl_texel_light;
 
-/* What gather rays travel through, and what they see there; `lights` as in pl_direct, for the sides that are mixed. */
+/* What gather rays travel through, and what they see there; `lights` as in pl_direct, for mixed sides and near hits. */
 typedef struct pl_gather_scene {
     const pl_scene *scene;
     const pl_patches *patches;

@@ -20,19 +20,33 @@ typedef struct smooth_job {
     bool stops_on_value;
 } smooth_job;
 
+/* (1 - x / 8)^8, about exp(-x), of which an expf would take most of the time here. */
+static float falling(float x) {
+    const float t = x < 8 ? 1 - 0.125f * x : 0, square = t * t, fourth = square * square;
+    return fourth * fourth;
+}
+
+/* fminf minds NaNs, and is a call. */
+static float least(float a, float b) { return a < b ? a : b; }
+
+/* The texel that is smoothed, as its neighbours are held against it. */
+typedef struct middle {
+    const double *position;
+    vec3 normal;
+    float luminance, variance;
+} middle;
+
 /* How far two receivers are samples of one smooth surface: 0 across creases, steps and charts. */
-static float geometric_weight(const smooth_job *job, size_t a, size_t b, float texels_apart) {
-    const double *p = job->receivers->positions + 3 * a, *q = job->receivers->positions + 3 * b;
+static float geometric_weight(const smooth_job *job, const middle *at, size_t other, float reach_squared) {
+    const double *p = at->position, *q = job->receivers->positions + 3 * other;
     const vec3 apart = {(float)(q[0] - p[0]), (float)(q[1] - p[1]), (float)(q[2] - p[2])};
-    const vec3 n = vec3_from(job->receivers->normals + 3 * a);
-    const float cosine = vec3_dot(n, vec3_from(job->receivers->normals + 3 * b));
-    const float reach = job->grid->spacing * texels_apart;
+    const float cosine = vec3_dot(at->normal, vec3_from(job->receivers->normals + 3 * other));
     /* a neighbour in the atlas that is further away in space than its texels are belongs to another chart */
-    if (cosine < 0.9f || !(reach > 0) || vec3_dot(apart, apart) > 4 * reach * reach)
+    if (cosine < 0.9f || vec3_dot(apart, apart) > 4 * reach_squared)
         return 0;
-    const float height = vec3_dot(apart, n) / reach, steepness = 8 * height * height;
+    const float height = vec3_dot(apart, at->normal);
     const float square = cosine * cosine, fourth = square * square;
-    return fourth * fourth * (steepness > 1e-6f ? expf(-steepness) : 1);
+    return fourth * fourth * falling(8 * height * height / reach_squared);
 }
 
 /*
@@ -40,36 +54,45 @@ static float geometric_weight(const smooth_job *job, size_t a, size_t b, float t
  * bright and noisy (under a lamp that hangs off the ceiling) would spread over the calm texels beside it.
  */
 static const float noisier = 4;
-/* Less leaves mottles, and much light on one side only of what is skewed; more washes out what light does at contacts.
- */
+/* Less leaves mottles, more washes out what light does at contacts. */
 static const float tolerance = 7;
 
-static float value_weight(const smooth_job *job, size_t a, size_t b) {
-    const float difference = luminance(job->values + CHANNELS * a) - luminance(job->values + CHANNELS * b);
-    const float va = job->variances[a], vb = job->variances[b];
-    const float noise = fminf(va, noisier * vb) + fminf(vb, noisier * va);
-    return noise > 0 ? expf(-difference * difference / (tolerance * noise)) : (difference == 0 ? 1.0f : 0.0f);
+static float value_weight(const smooth_job *job, const middle *at, size_t other) {
+    const float difference = at->luminance - luminance(job->values + CHANNELS * other);
+    const float va = at->variance, vb = job->variances[other];
+    const float noise = least(va, noisier * vb) + least(vb, noisier * va);
+    return noise > 0 ? falling(difference * difference / (tolerance * noise)) : (difference == 0 ? 1.0f : 0.0f);
+}
+
+/* Of a tap that is not the middle itself. */
+static float tap_weight(const smooth_job *job, const middle *at, size_t other, int32_t dx, int32_t dy) {
+    const float reach = job->grid->spacing * (float)job->step;
+    const float reach_squared = reach * reach * (float)(dx * dx + dy * dy);
+    if (!(reach_squared > 0))
+        return 0;
+    const float weight = geometric_weight(job, at, other, reach_squared);
+    return weight > 0 && job->stops_on_value ? weight * value_weight(job, at, other) : weight;
 }
 
 static void smooth_texel(const smooth_job *job, int32_t row, int32_t column, size_t receiver, float *out_values,
                          float *out_variances) {
     const pl_texel_grid *grid = job->grid;
+    const middle at = {job->receivers->positions + 3 * receiver, vec3_from(job->receivers->normals + 3 * receiver),
+                       luminance(job->values + CHANNELS * receiver), job->variances[receiver]};
     float sums[CHANNELS] = {0}, weights = 0, variance = 0;
     for (int32_t dy = -RADIUS; dy <= RADIUS; ++dy) {
+        const int32_t y = row + dy * job->step;
+        if (y < 0 || y >= grid->height)
+            continue;
         for (int32_t dx = -RADIUS; dx <= RADIUS; ++dx) {
-            const int32_t y = row + dy * job->step, x = column + dx * job->step;
-            if (y < 0 || x < 0 || y >= grid->height || x >= grid->width)
+            const int32_t x = column + dx * job->step;
+            if (x < 0 || x >= grid->width)
                 continue;
             const int32_t other = grid->receivers[(size_t)y * (size_t)grid->width + (size_t)x];
             if (other < 0)
                 continue;
-            float weight = spline[dx < 0 ? -dx : dx] * spline[dy < 0 ? -dy : dy];
-            if (dx || dy) {
-                const float apart = sqrtf((float)(dx * dx + dy * dy)) * (float)job->step;
-                weight *= geometric_weight(job, receiver, (size_t)other, apart);
-                if (weight > 0 && job->stops_on_value)
-                    weight *= value_weight(job, receiver, (size_t)other);
-            }
+            const float tap = spline[dx < 0 ? -dx : dx] * spline[dy < 0 ? -dy : dy];
+            const float weight = dx || dy ? tap * tap_weight(job, &at, (size_t)other, dx, dy) : tap;
             for (int k = 0; k < CHANNELS; ++k)
                 sums[k] += weight * job->values[CHANNELS * (size_t)other + (size_t)k];
             variance += weight * weight * job->variances[other];

@@ -9,7 +9,7 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def smooth(grid, spacing, positions, normals, values, variances, step, stops_on_value):
-    """Means of values (N, 3) weighted over the 5 x 5 taps ``step`` texels apart of a grid (H, W), and their variance."""
+    """Means of values (N, 3) over the 5 x 5 taps ``step`` texels apart of a grid (H, W), and their variance."""
     out, out_variances = np.zeros((len(values), 3)), np.zeros(len(values))
     luminances = values @ LUMINANCE
     for row, column in zip(*np.nonzero(grid >= 0)):
@@ -27,13 +27,18 @@ def smooth(grid, spacing, positions, normals, values, variances, step, stops_on_
                 if stops_on_value:
                     noise = _common_noise(variances[here], variances[there])
                     difference = (luminances[here] - luminances[there]) ** 2
-                    weight *= np.exp(-difference / (7 * noise)) if noise > 0 else float(difference == 0)
+                    weight *= _falling(difference / (7 * noise)) if noise > 0 else float(difference == 0)
             out[here] += weight * values[there]
             out_variances[here] += weight**2 * variances[there]
             total += weight
         out[here] /= total
         out_variances[here] /= total**2
     return out, out_variances
+
+
+def _falling(x):
+    """About exp(-x), with an end."""
+    return max(0.0, 1 - x / 8) ** 8
 
 
 def _common_noise(a, b):
@@ -45,4 +50,4 @@ def _same_surface(p, q, n, m, reach):
     cosine, apart = n @ m, q - p
     if cosine < 0.9 or apart @ apart > 4 * reach**2:
         return 0.0
-    return cosine**8 * np.exp(-8 * (apart @ n / reach) ** 2)
+    return cosine**8 * _falling(8 * (apart @ n / reach) ** 2)
