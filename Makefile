@@ -73,9 +73,9 @@ BENCH_OPTIONS := --quick
 bench: kernel
 	$(BIN)/patchlight bench --out $(OUT)/bench $(BENCH_OPTIONS)
 
-# CYCLES_OPTIONS= says which errors and samples, see tests/bench/cycles.py
+# CYCLES_OPTIONS= says which errors and samples, see tests/bench/beside_cycles.py
 bench-cycles: kernel
-	$(BIN)/python tests/bench/cycles.py $(SCENE) $(REFERENCE) --out $(OUT)/bench $(CYCLES_OPTIONS)
+	$(BIN)/python tests/bench/beside_cycles.py $(SCENE) $(REFERENCE) --out $(OUT)/bench $(CYCLES_OPTIONS)
 
 # every example is new at each run; what fails is printed with how to repeat it
 EXAMPLES := 10000

@@ -213,10 +213,8 @@ def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, seconds_
     """Irradiance (N, 3), its relative RMS error, the rays, and what stopped it ("" = nothing more to do)."""
     count = len(job.receivers)
     sums, taken = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64)
-    active, further = (
-        np.arange(count, dtype=np.uint32),
-        np.full(count, FIRST_RAYS if grid and count >= MANY_TEXELS else FIRST_ALONE),
-    )
+    active = np.arange(count)
+    further = np.full(count, FIRST_RAYS if grid and count >= MANY_TEXELS else FIRST_ALONE)
     rays, budget, idle, extra, begin, rms, started = 0, 0, 0, 0, 0.4, np.inf, time.perf_counter()
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be

@@ -1,6 +1,6 @@
 """Seconds and error of Patchlight and of Cycles' diffuse bake: the same file, UVs, texels and cores, one reference.
 
-    python tests/bench/cycles.py S.blend S.npz --out DIR [--errors 0.1 0.05] [--samples 4 16] [--texels N] [--as-it-is]
+    python tests/bench/beside_cycles.py S.blend S.npz --out DIR [--errors 0.1 0.05] [--samples 4 16] [--texels N] [--as-it-is]
 
 Cycles bakes with all objects joined into one mesh, its best case: as they are it starts anew for each object, which
 ``--as-it-is`` measures too. Only its bake operator is timed; ours is the report's ``seconds.bake``, with unwrapping.
