@@ -23,7 +23,6 @@
 
 typedef enum pl_status {
     PL_OK = 0,
-    PL_CANCELLED = 1,
     PL_ERR_MEMORY = -1,
     PL_ERR_ARGUMENT = -2, /* an index or number out of range, a count of 0 where one is needed */
     PL_ERR_EMBREE = -3    /* the library cannot be opened, or is not the one that was measured */

@@ -75,6 +75,24 @@ static bool unpack_gather(PyObject *const *tuples, PyObject **out_objects) {
            unpack(tuples[2], RECEIVER_ARRAY_COUNT, out_objects + RECEIVERS_AT);
 }
 
+/* The arrays as the kernel takes them; `scene` points into the rest. */
+typedef struct gather_view {
+    pl_solution solution;
+    pl_texel_light texels;
+    pl_lights lights;
+    pl_receivers receivers;
+    pl_gather_scene scene;
+} gather_view;
+
+static void view_gather(const door_array *arrays, const pl_scene *scene, const pl_patches *patches, int32_t width,
+                        float reach, gather_view *out) {
+    out->solution = solution_of(arrays);
+    out->texels = texels_of(arrays + TEXELS_AT, width, reach);
+    out->lights = lights_of(arrays + LIGHTS_AT);
+    out->receivers = receivers_of(arrays + RECEIVERS_AT);
+    out->scene = (pl_gather_scene){scene, patches, &out->solution, width > 0 ? &out->texels : NULL, &out->lights};
+}
+
 PyObject *door_gather(PyObject *self, PyObject *args) {
     enum { GROUPS = GATHER_ARRAY_COUNT, SHARES, SELECTED, SUMS, ARRAYS };
     PyObject *capsules[2], *tuples[3], *guide_arrays, *objects[ARRAYS];
@@ -104,15 +122,12 @@ PyObject *door_gather(PyObject *self, PyObject *args) {
         door_release(arrays, ARRAYS);
         return NULL;
     }
-    const pl_solution solution = solution_of(arrays);
-    const pl_lights lights = lights_of(arrays + LIGHTS_AT);
-    const pl_receivers receivers = receivers_of(arrays + RECEIVERS_AT);
-    const pl_texel_light texels = texels_of(arrays + TEXELS_AT, width, reach);
-    const pl_gather_scene in = {scene, patches, &solution, width > 0 ? &texels : NULL, &lights};
+    gather_view in;
+    view_gather(arrays, scene, patches, width, reach, &in);
     const pl_guides guides = {arrays[GROUPS].view.buf, arrays[SHARES].view.buf, door_rows(&arrays[SHARES])};
 
     Py_BEGIN_ALLOW_THREADS
-    status = pl_gather(&in, &receivers, &guides, arrays[SELECTED].view.buf, door_rows(&arrays[SELECTED]), rays,
+    status = pl_gather(&in.scene, &in.receivers, &guides, arrays[SELECTED].view.buf, door_rows(&arrays[SELECTED]), rays,
                        arrays[SUMS].view.buf, &traced);
     Py_END_ALLOW_THREADS
 
@@ -143,11 +158,8 @@ PyObject *door_learn_guides(PyObject *self, PyObject *args) {
                            {"out_moments", 'f', PL_GUIDE_CELLS, -1, true, {0}}};
     if (!patches || !unpack_gather(tuples, objects) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
-    const pl_solution solution = solution_of(arrays);
-    const pl_lights lights = lights_of(arrays + LIGHTS_AT);
-    const pl_receivers receivers = receivers_of(arrays + RECEIVERS_AT);
-    const pl_texel_light texels = texels_of(arrays + TEXELS_AT, width, reach);
-    const pl_gather_scene in = {scene, patches, &solution, width > 0 ? &texels : NULL, &lights};
+    gather_view in;
+    view_gather(arrays, scene, patches, width, reach, &in);
     const uint32_t *starts = arrays[FIRST_MEMBERS].view.buf;
     bool fits = first >= 0 && count >= 0 && (size_t)(first + count) <= door_rows(&arrays[MOMENTS]) &&
                 (size_t)(first + count) < door_rows(&arrays[FIRST_MEMBERS]);
@@ -156,7 +168,7 @@ PyObject *door_learn_guides(PyObject *self, PyObject *args) {
 
     Py_BEGIN_ALLOW_THREADS
     if (fits)
-        status = pl_learn_guides(&in, &receivers, arrays[MEMBERS].view.buf, arrays[FIRST_MEMBERS].view.buf,
+        status = pl_learn_guides(&in.scene, &in.receivers, arrays[MEMBERS].view.buf, arrays[FIRST_MEMBERS].view.buf,
                                  (size_t)first, (size_t)count, rays, seed, arrays[MOMENTS].view.buf, &traced);
     Py_END_ALLOW_THREADS
 

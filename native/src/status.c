@@ -5,8 +5,6 @@ const char *pl_status_text(pl_status status) {
     switch (status) {
     case PL_OK:
         return "done";
-    case PL_CANCELLED:
-        return "cancelled";
     case PL_ERR_MEMORY:
         return "out of memory";
     case PL_ERR_ARGUMENT:

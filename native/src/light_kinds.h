@@ -1,0 +1,77 @@
+/* Each kind of light by itself, for lights.c and light_balls.c. SPDX-License-Identifier: GPL-3.0-or-later */
+#ifndef PATCHLIGHT_LIGHT_KINDS_H
+#define PATCHLIGHT_LIGHT_KINDS_H
+
+#include "lights.h"
+
+enum { EXACT_TRIANGLES = 8 }; /* a mesh light of no more is summed exactly: Lambert's formula is 0.2 us */
+
+typedef struct point_light {
+    vec3 position, intensity;
+    float radius, is_soft;
+    vec3 direction;
+    float cos_outer, cos_inner;
+} point_light;
+
+typedef struct area_light {
+    vec3 centre, radiance, axis_u, axis_v;
+    float is_ellipse, spread;
+} area_light;
+
+typedef struct mesh_light {
+    vec3 centre;
+    float radius, weight;
+    size_t first, count;
+} mesh_light;
+
+static inline point_light point_of(const float *p) {
+    return (point_light){vec3_from(p), vec3_from(p + 3), p[6], p[7], vec3_from(p + 8), p[11], p[12]};
+}
+
+static inline area_light area_of(const float *p) {
+    return (area_light){vec3_from(p), vec3_from(p + 3), vec3_from(p + 6), vec3_from(p + 9), p[12], p[13]};
+}
+
+static inline mesh_light mesh_of(const float *p) {
+    return (mesh_light){vec3_from(p), p[3], p[4], (size_t)p[5], (size_t)p[6]};
+}
+
+static inline const float *parameters_of(const pl_lights *lights, size_t light) {
+    return lights->parameters + PL_LIGHT_FLOATS * light;
+}
+
+static inline void scaled(const float rgb[3], float factor, float out_rgb[3]) {
+    for (int k = 0; k < 3; ++k)
+        out_rgb[k] = rgb[k] * factor;
+}
+
+/* How far along itself a shadow ray goes to a lamp that may lie in a face. */
+static const float far_of_face = 0.999999f;
+
+/* Eight units in the last place of a point's largest coordinate, as in point_off_triangle. */
+static inline float rounding_of(vec3 p) {
+    return 9.5367431640625e-7f * fmaxf(fabsf(p.x), fmaxf(fabsf(p.y), fabsf(p.z)));
+}
+
+/* point_light.c: `p` are the light's parameters in the table. */
+float cone_importance(const point_light *light, vec3 point);
+bool sample_point_light(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out);
+float sun_importance(const float *p, vec3 normal);
+bool sample_sun(const float *p, vec3 normal, float x, float y, pl_light_sample *out);
+
+/* area_light.c */
+float spread_share(const area_light *light, float cosine);
+bool area_faces(const area_light *light, vec3 point);
+bool area_is_exact(const area_light *light);
+float area_of_lamp(const area_light *light);
+float area_exact(const area_light *light, vec3 point, vec3 normal);
+float area_importance(const area_light *light, const float *radiance, vec3 point, vec3 normal, float ball);
+bool sample_area(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out);
+
+/* mesh_light.c */
+void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 point, vec3 normal, float out_rgb[3]);
+float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float ball);
+bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float x, float y,
+                 pl_light_sample *out);
+
+#endif

@@ -1,0 +1,85 @@
+/* Glowing meshes. SPDX-License-Identifier: GPL-3.0-or-later */
+#include "light_kinds.h"
+#include "polygon.h"
+
+/* Radiance of a glowing triangle towards the side that a point is on. */
+static const float *radiance_towards(const pl_lights *lights, size_t triangle, vec3 corner, vec3 twice_area,
+                                     vec3 point) {
+    const bool is_front = vec3_dot(vec3_sub(point, corner), twice_area) >= 0;
+    return lights->triangle_radiances + 6 * triangle + (is_front ? 0 : 3);
+}
+
+void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 point, vec3 normal, float out_rgb[3]) {
+    out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
+    for (size_t t = light->first; t < light->first + light->count; ++t) {
+        const float *c = lights->triangle_corners + 9 * t;
+        const vec3 corners[3] = {vec3_from(c), vec3_from(c + 3), vec3_from(c + 6)};
+        const vec3 twice_area = vec3_cross(vec3_sub(corners[1], corners[0]), vec3_sub(corners[2], corners[0]));
+        const float *radiance = radiance_towards(lights, t, corners[0], twice_area, point);
+        if (luminance(radiance) <= 0)
+            continue;
+        const float factor = PL_PI * (float)point_to_polygon(point, normal, corners, 3);
+        for (int k = 0; k < 3; ++k)
+            out_rgb[k] += factor * radiance[k];
+    }
+}
+
+float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float ball) {
+    const mesh_light light = mesh_of(p);
+    const vec3 to = vec3_sub(light.centre, point);
+    if (light.count > EXACT_TRIANGLES || vec3_dot(to, to) > 16 * light.radius * light.radius)
+        return ball;
+    float rgb[3];
+    mesh_exact(lights, &light, point, normal, rgb);
+    return luminance(rgb);
+}
+
+/* The triangle whose share of the cumulative sums x falls into; x becomes its place in that share. */
+static size_t choose_triangle(const pl_lights *lights, const mesh_light *light, float *io_x, float *out_chance) {
+    size_t low = light->first, high = light->first + light->count;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (lights->cumulative[middle] <= *io_x)
+            low = middle;
+        else
+            high = middle;
+    }
+    const float start = lights->cumulative[low];
+    const float end = low + 1 < light->first + light->count ? lights->cumulative[low + 1] : 1;
+    *out_chance = fmaxf(end - start, 1e-12f);
+    *io_x = fminf(fmaxf((*io_x - start) / *out_chance, 0), 1);
+    return low;
+}
+
+bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float x, float y,
+                 pl_light_sample *out) {
+    const mesh_light light = mesh_of(p);
+    float chance;
+    const size_t t = choose_triangle(lights, &light, &x, &chance);
+    const float *c = lights->triangle_corners + 9 * t;
+    const vec3 a = vec3_from(c);
+    const vec3 ab = vec3_sub(vec3_from(c + 3), a), ac = vec3_sub(vec3_from(c + 6), a);
+    const vec3 twice_area = vec3_cross(ab, ac);
+    const float width = sqrtf(x);
+    vec3 target = vec3_mul_add(ab, width * (1 - y), vec3_mul_add(ac, width * y, a));
+
+    /* the target is moved off the face towards the receiver, so that the face itself,
+       which is an occluder too, is not in the way */
+    vec3 lamp_normal = vec3_unit(twice_area);
+    if (vec3_dot(vec3_sub(point, target), lamp_normal) < 0)
+        lamp_normal = vec3_scale(lamp_normal, -1);
+    target = vec3_mul_add(lamp_normal, fmaxf(rounding_of(target), 9.5367431640625e-7f * light.radius), target);
+
+    out->direction = vec3_sub(target, point);
+    out->far = far_of_face;
+    const float square = vec3_dot(out->direction, out->direction);
+    const float reach = fmaxf(sqrtf(square), 1e-30f);
+    const float lamp_cosine = -vec3_dot(out->direction, lamp_normal) / reach;
+    const float cosine = vec3_dot(out->direction, normal) / reach;
+    if (cosine <= 0 || lamp_cosine <= 0)
+        return false;
+    const float area = 0.5f * vec3_length(twice_area);
+    const float *radiance = radiance_towards(lights, t, a, twice_area, point);
+    scaled(radiance, cosine * lamp_cosine * area / (square * chance), out->irradiance);
+    return luminance(radiance) > 0;
+}

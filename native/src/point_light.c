@@ -1,0 +1,101 @@
+/* Points, balls and spots, and suns. Radiometry as Cycles has it. SPDX-License-Identifier: GPL-3.0-or-later */
+#include "light_kinds.h"
+
+/* Smoothstep from the cone's edge inwards. */
+static float cone_share(const point_light *light, vec3 from_light) {
+    if (light->cos_inner < -1)
+        return 1;
+    const float cosine = vec3_dot(from_light, light->direction);
+    const float range = fmaxf(light->cos_inner - light->cos_outer, 1e-6f);
+    const float t = fminf(fmaxf((cosine - light->cos_outer) / range, 0), 1);
+    return t * t * (3 - 2 * t);
+}
+
+/* What a spot's cone lets through of its ball's importance. */
+float cone_importance(const point_light *light, vec3 point) {
+    const vec3 to = vec3_sub(light->position, point);
+    const float distance = vec3_length(to);
+    if (distance <= light->radius)
+        return 1;
+    const float share = cone_share(light, vec3_scale(to, -1 / distance));
+    /* a sphere's edge can look into a cone that its centre is out of */
+    return fmaxf(share, light->radius > 0 ? 0.01f : 0);
+}
+
+/* A uniform direction in the cone that a sphere fills; its solid angle over the area of a disc of its radius. */
+static bool sample_sphere(const point_light *light, vec3 to, float distance, float x, float y, vec3 *out_direction,
+                          float *out_far, float *out_over_disc) {
+    vec3 u, v;
+    const vec3 axis = vec3_scale(to, 1 / distance);
+    const float sine = light->radius / distance;
+    const float angle = 2 * PL_PI * y;
+    if (sine >= 1)
+        return false;
+    vec3_basis(axis, &u, &v);
+    /* 1 - cos without cancellation for small lamps far away */
+    const float one_minus_cos_max = sine * sine / (1 + sqrtf(1 - sine * sine));
+    const float one_minus_cos = x * one_minus_cos_max;
+    const float cosine = 1 - one_minus_cos;
+    const float side = sqrtf(fmaxf(0, one_minus_cos * (2 - one_minus_cos)));
+    const vec3 across = vec3_mul_add(u, side * cosf(angle), vec3_scale(v, side * sinf(angle)));
+    *out_direction = vec3_mul_add(axis, cosine, across);
+    *out_far = distance * cosine - sqrtf(fmaxf(0, light->radius * light->radius - distance * distance * side * side));
+    *out_over_disc = 2 / (distance * distance * (1 + sqrtf(1 - sine * sine)));
+    return true;
+}
+
+bool sample_point_light(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out) {
+    const point_light light = point_of(p);
+    const vec3 to = vec3_sub(light.position, point);
+    const float distance = vec3_length(to);
+    float factor;
+    if (distance <= 0)
+        return false;
+
+    if (light.radius <= 0) {
+        out->direction = to;
+        out->far = far_of_face;
+        const float cosine = vec3_dot(to, normal) / distance;
+        factor = cosine * cone_share(&light, vec3_scale(to, -1 / distance)) / (distance * distance);
+    } else if (light.is_soft > 0) {
+        /* a disc of radiance I / (pi r^2) that always faces the receiver */
+        vec3 u, v;
+        const vec3 axis = vec3_scale(to, 1 / distance);
+        vec3_basis(axis, &u, &v);
+        const float radius = light.radius * sqrtf(x), angle = 2 * PL_PI * y;
+        const vec3 across = vec3_mul_add(u, radius * cosf(angle), vec3_scale(v, radius * sinf(angle)));
+        out->direction = vec3_add(to, across);
+        out->far = 1;
+        const float square = vec3_dot(out->direction, out->direction), reach = sqrtf(square);
+        const float cosine = vec3_dot(out->direction, normal) / reach;
+        factor = cosine * (distance / reach) / square;
+        factor *= cone_share(&light, vec3_scale(out->direction, -1 / reach));
+    } else {
+        /* a sphere of radiance P / (4 pi^2 r^2) = I / (pi r^2), times its solid angle: r^2 cancels, however small */
+        float over_disc;
+        if (!sample_sphere(&light, to, distance, x, y, &out->direction, &out->far, &over_disc))
+            return false;
+        factor = vec3_dot(out->direction, normal) * over_disc;
+        factor *= cone_share(&light, vec3_scale(out->direction, -1));
+    }
+    scaled(p + 3, factor, out->irradiance);
+    return factor > 0;
+}
+
+float sun_importance(const float *p, vec3 normal) {
+    return luminance(p + 3) * fmaxf(0, vec3_dot(vec3_from(p), normal) + sinf(fminf(p[6], 1.5f)));
+}
+
+bool sample_sun(const float *p, vec3 normal, float x, float y, pl_light_sample *out) {
+    vec3 u, v;
+    const vec3 axis = vec3_from(p);
+    vec3_basis(axis, &u, &v);
+    /* a disc on the sky, narrow enough for its projection to stand for it */
+    const float radius = tanf(p[6]) * sqrtf(x), angle = 2 * PL_PI * y;
+    const vec3 across = vec3_mul_add(u, radius * cosf(angle), vec3_scale(v, radius * sinf(angle)));
+    out->direction = vec3_unit(vec3_add(axis, across));
+    out->far = INFINITY;
+    const float cosine = vec3_dot(out->direction, normal);
+    scaled(p + 3, cosine, out->irradiance);
+    return cosine > 0;
+}
