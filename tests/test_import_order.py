@@ -13,8 +13,8 @@ ADDON = ROOT / "addon"
 MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "core": {"core"}}
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
-    *("ranges", "settings", "scene", "sound_faces", "textures", "emitters", "relative", "report"),
-    *("workers", "kernel", "patches"),
+    *("ranges", "settings", "scene", "sound_faces", "textures", "emitters", "relative", "z_order"),
+    *("report", "workers", "kernel", "patches"),
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
     *("transport", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),

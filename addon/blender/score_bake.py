@@ -12,13 +12,13 @@ import bpy
 import numpy as np
 
 from ..core.lightmap import bilinear
+from ..core.relative import DARK
 from ..core.scene import exitance_from_radiance
 from .files import FileError
 from .read_mesh import LIGHTMAP_LAYER
 from .write_lightmap import IMAGE_PROPERTY, RECT_PROPERTY
 
 KEYS = ("object", "triangle", "bary", "position", "irradiance", "stderr")
-DARK = 0.3  # of the median: what is added to R before an error is called relative
 LIT = 1e-4  # of the mean: points below it do not count for the median
 SURE = 0.05  # where the reference's own error is larger it judges nothing
 MOVED = 1e-5  # of the scene's size: a triangle that is elsewhere is another one

@@ -57,7 +57,7 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
             progress.begin("unwrap")
             charts = unwrap(scene, settings, progress.step)
             progress.begin("texels")
-            texel_map = texels(scene, charts)
+            texel_map = texels(charts)
             receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
             grid = texel_grid(scene, charts, texel_map, receivers)
             seen = seen_through_lightmap(scene, charts, texel_map, settings.seed)

@@ -138,7 +138,7 @@ def gather_irradiance(
     on_step : (0..1) -> None
     """
     if not len(receivers):
-        return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", {"direct": 0, "gather": 0})
+        return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", {"direct": 0, "gather": 0, "probe": 0})
     job = _Job(kernel, solved, receivers, no_guides(len(receivers)))
     direct, shadow_rays = _direct_until(job, error, seed, lambda done: on_step(0.25 * done))
     looks = 0
@@ -228,25 +228,24 @@ def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, seconds_
         if idle == MOST_IDLE:
             return values, rms, rays, "as further rays no longer help"
 
-        # far from the target all go on, near it the noisy ones, once it is met only what would show as a speckle, and
-        # not for long
         extra += rms <= error
-        if extra > MOST_EXTRA:
+        wanted = _wanting(relative, rms, error)
+        wanted = wanted[taken[wanted] < MOST_RAYS]
+        if extra > MOST_EXTRA or not len(wanted):
             return values, rms, rays, ""
-        active = np.flatnonzero(relative > (error if rms > error else 2 * error))
-        if rms > FAR_OFF * error or (rms > error and not len(active)):
-            active = np.arange(count)
-        active = active[taken[active] < MOST_RAYS]
-        further = _further_rays(taken)
         in_time = seconds_left() * rays / (time.perf_counter() - started)
-        cost = rays / (REPLICATES * int(taken.sum()))
-        wanted, rays_left = len(active), min(budget - rays, in_time)
-        if REPLICATES * cost * further[active].sum() > rays_left:
-            further = np.maximum(further // 2, 1)  # fewer for all are worth more than all for some
-        active = _affordable(active, relative, REPLICATES * cost * further, rays_left)
-        if len(active) < ENOUGH * wanted or not wanted:
-            reason = "by the time limit" if in_time < budget - rays else "by the budget of rays"
-            return values, rms, rays, reason if wanted else ""
+        cost = rays / int(taken.sum())  # of one more ray of all replicates, with those that it goes on as
+        active, further = _affordable(wanted, relative, _further_rays(taken), cost, min(budget - rays, in_time))
+        if len(active) < ENOUGH * len(wanted):
+            return values, rms, rays, "by the time limit" if in_time < budget - rays else "by the budget of rays"
+
+
+def _wanting(relative, rms, error):
+    """Receivers that should go on, in order: far from the target all, near it the noisy ones, then only speckles."""
+    noisy = np.flatnonzero(relative > (error if rms > error else 2 * error))
+    if rms > FAR_OFF * error or (rms > error and not len(noisy)):
+        return np.arange(len(relative))
+    return noisy
 
 
 def _further_rays(taken):
@@ -273,10 +272,12 @@ def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:
     return rays
 
 
-def _affordable(active, relative, costs, rays_left):
-    """Those of the receivers that a pass can afford, the noisiest first; in order."""
-    noisiest = active[np.argsort(-relative[active], kind="stable")]
-    return np.sort(noisiest[np.cumsum(costs[noisiest]) <= rays_left])
+def _affordable(wanted, relative, further, cost, rays_left):
+    """Receivers that a pass can afford, the noisiest first, in order, and how many further rays each gets."""
+    if cost * further[wanted].sum() > rays_left:
+        further = np.maximum(further // 2, 1)  # fewer for all are worth more than all for some
+    noisiest = wanted[np.argsort(-relative[wanted], kind="stable")]
+    return np.sort(noisiest[np.cumsum(cost * further[noisiest]) <= rays_left]), further
 
 
 def _best_estimate(job, grid, means, direct, chosen, probes):

@@ -12,6 +12,7 @@ import numpy as np
 
 from .kernel import GUIDE_CELLS, KernelScene
 from .receivers import Receivers
+from .z_order import z_order
 
 GROUP = 256  # receivers that share a guide
 LEARNERS = 32  # of a group, that look for all
@@ -79,9 +80,7 @@ def _neighbours(receivers):
     cells = np.clip((receivers.positions - low) / extent * 1023, 0, 1023).astype(np.uint64)
     facing = np.clip((receivers.normals + 1) * (0.5 * NORMAL_CELLS), 0, NORMAL_CELLS - 1).astype(np.uint64)
     way = (facing[:, 0] * NORMAL_CELLS + facing[:, 1]) * NORMAL_CELLS + facing[:, 2]
-    x, y, z = (_spread_bits(cells[:, axis]) << np.uint64(axis) for axis in range(3))
-    place = x | y | z
-    order = np.argsort(way << np.uint64(30) | place, kind="stable")
+    order = np.argsort(way << np.uint64(30) | z_order(*cells.T), kind="stable")
     # a group ends where its receivers look elsewhere, or when it is full
     turns = np.flatnonzero(np.diff(way[order], prepend=way[order][:1] + np.uint64(1)))
     cuts = [np.arange(turn, end, GROUP) for turn, end in zip(turns, np.append(turns[1:], len(order)))]
@@ -98,13 +97,6 @@ def _runs(starts, ends):
     counts = ends - starts
     before = np.cumsum(counts) - counts
     return np.arange(counts.sum()) + np.repeat(starts - before, counts)
-
-
-def _spread_bits(x):
-    """Ten bits to every third place (Morton 1966)."""
-    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
-        x = (x | x << np.uint64(shift)) & np.uint64(mask)
-    return x
 
 
 def _learners(order, starts, ends):

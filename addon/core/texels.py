@@ -8,7 +8,7 @@ import numpy as np
 
 from . import kernel
 from .charts import Charts
-from .scene import Scene
+from .z_order import z_order
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +39,11 @@ class TexelMap:
         return len(self.rows)
 
 
-def texels(scene: Scene, charts: Charts) -> TexelMap:
+def texels(charts: Charts) -> TexelMap:
     """The receivers of a lightmap: inside wins over outside, then near over far, then the lower triangle."""
     triangles, distances, barycentrics = kernel.rasterise_texels(charts.uvs, charts.width, charts.height)
     rows, columns = np.nonzero(triangles >= 0)
-    order = np.argsort(_spread_bits(rows) << np.uint64(1) | _spread_bits(columns))
+    order = np.argsort(z_order(columns, rows))
     rows, columns = rows[order], columns[order]
     return TexelMap(
         rows.astype(np.int32),
@@ -54,17 +54,3 @@ def texels(scene: Scene, charts: Charts) -> TexelMap:
         charts.width,
         charts.height,
     )
-
-
-def _spread_bits(x):
-    """The bits of x to every second place (Morton 1966)."""
-    x = x.astype(np.uint64)
-    for shift, mask in (
-        (16, 0x0000FFFF0000FFFF),
-        (8, 0x00FF00FF00FF00FF),
-        (4, 0x0F0F0F0F0F0F0F0F),
-        (2, 0x3333333333333333),
-        (1, 0x5555555555555555),
-    ):
-        x = (x | x << np.uint64(shift)) & np.uint64(mask)
-    return x

@@ -1,6 +1,6 @@
 """Seconds and error of Patchlight and of Cycles' diffuse bake: the same file, UVs, texels and cores, one reference.
 
-    python tests/bench/beside_cycles.py S.blend S.npz --out DIR [--errors 0.1 0.05] [--samples 4 16] [--texels N] [--as-it-is]
+    python tests/bench/beside_cycles.py S.blend S.npz --out DIR [--errors 0.1 0.05] [--samples 4 16] [--as-it-is]
 
 Cycles bakes with all objects joined into one mesh, its best case: as they are it starts anew for each object, which
 ``--as-it-is`` measures too. Only its bake operator is timed; ours is the report's ``seconds.bake``, with unwrapping.
@@ -58,7 +58,7 @@ def ours(args, error, reference) -> dict:
     file, report = args.out / f"ours_{error:g}.blend", args.out / f"ours_{error:g}.json"
     command = [Path(sys.executable).with_name("patchlight"), "bake", args.blend, "--output", file, "--report", report]
     command += ["--target", "lightmap", "--texels", str(args.texels), "--error", str(error)]
-    subprocess.run(list(map(str, command)), check=True, stderr=subprocess.DEVNULL)
+    subprocess.run(list(map(str, command)), check=True)
     open_blend(file)
     seconds = json.loads(report.read_text())["seconds"]["bake"]
     return {"way": f"patchlight, error {error:g}", "seconds": seconds, "file": str(file), **result(reference)}

@@ -48,6 +48,13 @@ def test_the_error_is_relative_to_the_light_and_its_median(baked, tmp_path):
     assert found.bias == pytest.approx(found.error)
 
 
+def test_quantiles_tell_one_wrong_point_from_all(baked, tmp_path):
+    irradiance = np.full((12, 1), 2.0)
+    irradiance[5] = 1.6
+    found = score(load_reference(write_reference(tmp_path / "r.npz", irradiance)))
+    assert (found.p50, found.p95) == pytest.approx((0, 0.4 / (1.6 + 0.3 * 2)), abs=1e-6)
+
+
 def test_the_noise_of_the_reference_is_taken_out(baked, tmp_path):
     found = score(load_reference(write_reference(tmp_path / "r.npz", 1.9, stderr=0.05)))
     assert found.error == pytest.approx((0.1**2 - 0.05**2) ** 0.5 / (1.3 * 1.9), rel=1e-5)

@@ -46,7 +46,7 @@ def assert_loops_have_one_uv(scene, charts):
 
 
 def assert_lookups_touch_own_receivers_only(scene, charts, rng):
-    texel_map = texels(scene, charts)
+    texel_map = texels(charts)
     owner = np.full((charts.height, charts.width), -1)
     owner[texel_map.rows, texel_map.columns] = charts.charts[texel_map.triangles]
     placed = np.flatnonzero(charts.charts >= 0)
@@ -66,7 +66,7 @@ def assert_lookups_touch_own_receivers_only(scene, charts, rng):
 
 def charts_per_texel_ring(scene, charts):
     """Pairs of neighbouring receivers, diagonals included, of different charts."""
-    texel_map = texels(scene, charts)
+    texel_map = texels(charts)
     owner = np.full((charts.height + 1, charts.width + 2), -1)
     owner[texel_map.rows, texel_map.columns + 1] = charts.charts[texel_map.triangles]
     here = owner[:-1, 1:-1]

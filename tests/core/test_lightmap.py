@@ -46,7 +46,7 @@ def bilinear(pixels, points):
 
 def baked_positions(scene, charts):
     """A lightmap that holds positions [m], and the positions looked up at points inside charts."""
-    texel_map = texels(scene, charts)
+    texel_map = texels(charts)
     positions = np.einsum("nk,nkx->nx", texel_map.barycentrics.astype(float), scene.corners[texel_map.triangles])
     return texel_map, assemble(np.pi * positions, texel_map, charts)
 
@@ -80,7 +80,7 @@ def test_a_linear_function_of_position_is_looked_up_exactly_inside_charts():
 def test_a_constant_is_looked_up_everywhere():
     scene = scene_of(rough_sheet(np.random.default_rng(2)), box())
     charts = unwrap(scene, BakeSettings(texels=1 << 13))
-    texel_map = texels(scene, charts)
+    texel_map = texels(charts)
     lightmap = assemble(np.full((len(texel_map), 3), np.pi), texel_map, charts)
     # means of equal numbers, in float32
     assert lightmap.pixels == pytest.approx(1, abs=1e-5)

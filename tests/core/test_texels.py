@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from addon.core import kernel
 from addon.core.charts import Charts
 from addon.core.texels import texels
-from tests.core.meshes import scene_of
 from tests.reference import texels as reference
 
 WIDTH, HEIGHT = 13, 9
@@ -108,9 +107,8 @@ def morton(row, column):
 
 
 def test_the_texel_map_lists_neighbours_after_each_other():
-    scene = scene_of(([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]))
     charts = Charts(np.float32([[[1.5, 1.5], [4.5, 1.5], [1.5, 4.5]]]), np.zeros(1, np.int32), 8, 6)
-    found = texels(scene, charts)
+    found = texels(charts)
     order = [morton(row, column) for row, column in zip(found.rows.tolist(), found.columns.tolist())]
     assert order == sorted(set(order))
     assert found.is_inside.sum() == 10  # 4 + 3 + 2 + 1 centres

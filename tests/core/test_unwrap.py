@@ -65,7 +65,7 @@ def test_boxes_fill_most_of_the_lightmap():
     scene = scene_of(*(box((1, 1 + k / 10, 2), (5 * k, 0, 0)) for k in range(20)))
     charts = unwrap(scene, BakeSettings(texels=1 << 18))
     # 120 rectangles of about 50 x 45 texels: gutters take 5 %, a good packing leaves a tenth
-    assert len(texels(scene, charts)) > 0.85 * charts.width * charts.height
+    assert len(texels(charts)) > 0.85 * charts.width * charts.height
 
 
 @pytest.mark.parametrize("density", [3.0, 40.0])
@@ -147,7 +147,7 @@ def test_huge_and_tiny_and_doubled_things_together():
 def test_needles_get_a_texel():
     scene = scene_of(([(0, 0, 0), (10, 0, 0), (10, 1e-7, 0)], [(0, 1, 2)]), box())
     charts = unwrap(scene, BakeSettings(texels=1 << 12))
-    assert (texels(scene, charts).triangles == 0).any()
+    assert (texels(charts).triangles == 0).any()
     assert_places_are_sound(scene, charts, np.random.default_rng(0))
 
 
