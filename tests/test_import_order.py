@@ -19,7 +19,8 @@ CORE_ORDER = (
     *("transport", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
     *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides", "radiosity"),
-    *("charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing", "probes", "gather", "lightmap", "bake"),
+    *("charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing", "probes"),
+    *("allocation", "gather", "lightmap", "bake"),
     *("peak_memory", "bench_row", "bench_cube", "bench_scenes", "bench_peers", "bench_factors", "bench_light", "bench"),
     "bench_plot",
 )

@@ -132,7 +132,7 @@ def slit_case(case: Case, estimator) -> dict:
         elif key.startswith("H_points"):
             points = _points_of(case, len(expected))
             seen = [estimator.element(p, _normal_at(p, faces), slit, scene.blockers) for p in points]
-            out[key] = solved([float(s.value) for s in seen])
+            out[key] = Estimate(*(np.array([getattr(s, part) for s in seen]) for part in Estimate.__slots__))
         else:
             raise CaseError(f"result {key!r} is not understood")
     return out

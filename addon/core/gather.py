@@ -7,38 +7,39 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .allocation import measured_errors, next_pass, rays_due
 from .emitters import LUMINANCE
 from .guides import Guides, learn_guides, no_guides
 from .kernel import KernelScene
-from .probes import Measured, SeenPoints, chosen_receivers
+from .probes import Measured, SeenPoints, chosen_receivers, rms_of
 from .radiosity import Solved
 from .receivers import Receivers
 from .relative import scale_of
-from .smoothing import TexelGrid, smoothed
+from .smoothing import TexelGrid, blurred, smoothed
 from .texel_light import NO_TEXEL_LIGHT, TexelLight
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
-LOOK_RAYS = 4  # of a replicate, for the first look at the texels' light, which further rays then see
+LOOK_RAYS = 1  # of a replicate, for the first look at the texels' light, which the first pass then sees
 NEAR = 10.0  # texels: rays that hit from nearer do not take a texel's light
 NEAR_SHARE = 1 / 16  # of the scene, at the most: in a coarse lightmap all would be near
 FAR = 3.3  # times as far do rays go on from patches, where texels have a light of their own: few are left that need it
 FIRST_RAYS = 2  # of a replicate, in the first pass, on MANY_TEXELS and more, whose neighbours vouch for them;
 FIRST_ALONE = 8  # elsewhere: fewer may miss what is bright and small, and not know it
 MANY_TEXELS = 1 << 16
-GROWTH = 3  # times the rays that a receiver has, about, that a further pass adds
 MOST_RAYS = 2048  # of a replicate
 MOST_COST = 15  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
-FAR_OFF = 1.5  # times the target: what smoothing leaves of the noise is not known well enough to choose by it
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
-MOST_EXTRA = 2  # passes after the target is met, each with some four times the rays: speckles are gone by then
+AIM = 0.9  # of the target: what receivers are due is an estimate
+SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
+MOST_EXTRA = 2  # passes after that, each with four times the rays: speckles are gone by then
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 DIRECT_PASSES = 2  # each with four times the shadow rays of the one before, for the receivers that need it
 DIRECT_SHARE = 0.5  # of the error that direct light may have
-MOST_DOUBT = 4.0  # how much more than the replicates say the noise is taken to be at the most
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
+PILOT = 4  # of a probe's rays, one in so many tells whether it needs more
 MORE_RAYS, MOST_PROBE_RAYS = 16, 2048  # times as many, but not more, for probes more uncertain than the error aimed at
 FURTHER = 2.0  # seen points look so many times further before they take a texel's or a patch's light for what is there
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
@@ -143,47 +144,58 @@ def gather_irradiance(
     direct, shadow_rays = _direct_until(job, error, seed, lambda done: on_step(0.25 * done))
     looks = 0
     if grid is not None:
-        job, looks = _with_texel_light(job, grid, direct, seed + 2, lambda done: on_step(0.25 + 0.15 * done))
+        job, looks = _with_first_look(job, grid, direct, seed + 2, lambda done: on_step(0.25 + 0.15 * done))
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
-    job = replace(job, guides=guides)
-    chosen = chosen_receivers(len(receivers))
-    probes = _measure(job.part(chosen), error, seed + 1)
-    values, rms, rays, stopped = _gather_until(job, grid, direct, chosen, probes, error, seed, seconds_left, on_step)
-    at_points = _measure(
-        replace(job, receivers=seen.receivers, guides=no_guides(len(seen.receivers))).looking_further(FURTHER),
-        error,
-        seed + 5,
-    )
-    shown = seen.look_up(values)
+    gathered = _gather_until(replace(job, guides=guides), grid, direct, error, seed, seconds_left, on_step)
+    of_points = replace(gathered.job, receivers=seen.receivers, guides=no_guides(len(seen.receivers)))
+    at_points = _measure(of_points.looking_further(FURTHER), error, seed + 5)
+    shown = seen.look_up(gathered.values)
+    seen_error = rms_of(at_points.squares_of(shown, scale_of(shown)))
     traced = {
         "direct": shadow_rays,
-        "gather": looks + learning + rays,
-        "probe": probes.rays + at_points.rays,
+        "gather": looks + learning + gathered.rays,
+        "probe": gathered.probe_rays + at_points.rays,
     }
-    return Irradiance(values, rms, at_points.error_of(shown, scale_of(shown)), rms <= error, stopped, traced)
+    return Irradiance(gathered.values, gathered.rms, seen_error, gathered.rms <= error, gathered.stopped, traced)
 
 
-def _with_texel_light(job: _Job, grid: TexelGrid, direct, seed, on_step):
+def _with_first_look(job: _Job, grid: TexelGrid, direct, seed, on_step):
     """The job whose rays see what a first look found on the texels, and the rays of that look."""
     sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
     rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, LOOK_RAYS, seed, sums, on_step)
-    gathered, _ = smoothed(job.kernel.workers, grid, job.receivers, sums / LOOK_RAYS)
-    radiosity = (grid.reflectance * (direct + gathered)).astype(np.float32)
     reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
-    return replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, grid.receivers, radiosity, reach)), rays
+    no_light = np.zeros((len(sums), 3), np.float32)
+    job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, grid.receivers, no_light, reach))
+    return _seeing(job, grid, direct, sums / LOOK_RAYS), rays
+
+
+def _seeing(job: _Job, grid: TexelGrid, direct, means) -> _Job:
+    """The job whose rays see what replicate means (N, R, 3) have found on the texels.
+
+    Blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while smoothing
+    that minds values would take some of a few rays' light away.
+    """
+    gathered = blurred(job.kernel.workers, grid, job.receivers, means)
+    radiosity = (grid.reflectance * (direct + gathered)).astype(np.float32)
+    return replace(job, texel_light=replace(job.texel_light, radiosity=radiosity))
 
 
 def _measure(job: _Job, error, seed) -> Measured:
-    """The light at a job's receivers, with many rays, and with more where that is not enough to judge by."""
+    """The light at a job's receivers, with many rays, and with more where that would not be enough to judge by.
+
+    Where, a few rays of their own tell: those that happen to miss what is bright would take themselves to be certain.
+    """
     direct, variance, rays = job.direct(4 * shadow_samples(error), seed)
-    count = probe_rays(error)
-    gathered, noise, traced = _gathered(job, count, seed)
-    values, scale, rays = gathered.mean(axis=1) + direct, scale_of(direct + gathered.mean(axis=1)), rays + traced
-    noisy = np.flatnonzero(np.sqrt(noise) > scale * error)
-    if len(noisy):
-        again, less_noise, traced = _gathered(job.part(noisy), min(MORE_RAYS * count, MOST_PROBE_RAYS), seed + 1)
-        values[noisy], noise[noisy], rays = again.mean(axis=1) + direct[noisy], less_noise, rays + traced
-    return Measured(values @ LUMINANCE, variance + noise, rays)
+    values, noise, count = direct.copy(), variance.copy(), probe_rays(error)
+    pilot, spread, traced = _gathered(job, max(count // PILOT, 1), seed)
+    quiet = np.sqrt(spread / PILOT) <= error * scale_of(direct + pilot.mean(axis=1))
+    rays += traced
+    for part, share, own in ((quiet, count, seed + 1), (~quiet, min(MORE_RAYS * count, MOST_PROBE_RAYS), seed + 2)):
+        gathered, spread, traced = _gathered(job.part(np.flatnonzero(part)), share, own)
+        values[part] += gathered.mean(axis=1)
+        noise[part] += spread
+        rays += traced
+    return Measured(values @ LUMINANCE, noise, rays)
 
 
 def _gathered(job: _Job, count, seed):
@@ -209,12 +221,23 @@ def _direct_until(job: _Job, error, seed, on_step):
     return direct, rays
 
 
-def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, seconds_left, on_step):
-    """Irradiance (N, 3), its relative RMS error, the rays, and what stopped it ("" = nothing more to do)."""
-    count = len(job.receivers)
+@dataclass(frozen=True, slots=True)
+class _Gathered:
+    """What passes have come to: irradiance (N, 3), its relative RMS error, what stopped them ("" = nothing to do)."""
+
+    job: _Job  # whose rays see the light that was found last
+    values: np.ndarray
+    rms: float
+    stopped: str
+    rays: int
+    probe_rays: int
+
+
+def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -> _Gathered:
+    """Gather in passes, each for the receivers that still need it, until the measured error is the target."""
+    count, chosen, probes = len(job.receivers), chosen_receivers(len(job.receivers)), None
     sums, taken = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64)
-    active = np.arange(count)
-    further = np.full(count, FIRST_RAYS if grid and count >= MANY_TEXELS else FIRST_ALONE)
+    active, further = np.arange(count), np.full(count, FIRST_RAYS if grid and count >= MANY_TEXELS else FIRST_ALONE)
     rays, budget, idle, extra, begin, rms, started = 0, 0, 0, 0, 0.4, np.inf, time.perf_counter()
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
@@ -222,35 +245,31 @@ def _gather_until(job: _Job, grid, direct, chosen, probes, error, seed, seconds_
         rays += _gather_pass(job, active, taken, further, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
         begin += width
         budget = budget or int(max(MOST_COST * rays, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
-        before = rms
-        values, relative, rms = _best_estimate(job, grid, sums / taken[:, None, None], direct, chosen, probes)
+        means, before = sums / taken[:, None, None], rms
+        if grid:
+            job = _seeing(job, grid, direct, means)
+        probes = probes or _measure(job.part(chosen), error, seed + 1)
+        values, relative, squares = _best_estimate(job, grid, means, direct, chosen, probes)
+        rms = rms_of(squares)
+
+        def ended(why=""):
+            return _Gathered(job, values, rms, why, rays, probes.rays)  # noqa: B023
+
         idle = idle + 1 if rms > max(error, WORTH_IT * before) else 0
         if idle == MOST_IDLE:
-            return values, rms, rays, "as further rays no longer help"
-
+            return ended("as further rays no longer help")
+        errors = measured_errors(relative, chosen, squares)
         extra += rms <= error
-        wanted = _wanting(relative, rms, error)
-        wanted = wanted[taken[wanted] < MOST_RAYS]
-        if extra > MOST_EXTRA or not len(wanted):
-            return values, rms, rays, ""
+        speckled = np.where(errors > SPECKLE * error, np.inf, 0.0)
+        due = rays_due(errors, taken, AIM * error) if rms > error else speckled
         in_time = seconds_left() * rays / (time.perf_counter() - started)
         cost = rays / int(taken.sum())  # of one more ray of all replicates, with those that it goes on as
-        active, further = _affordable(wanted, relative, _further_rays(taken), cost, min(budget - rays, in_time))
-        if len(active) < ENOUGH * len(wanted):
-            return values, rms, rays, "by the time limit" if in_time < budget - rays else "by the budget of rays"
-
-
-def _wanting(relative, rms, error):
-    """Receivers that should go on, in order: far from the target all, near it the noisy ones, then only speckles."""
-    noisy = np.flatnonzero(relative > (error if rms > error else 2 * error))
-    if rms > FAR_OFF * error or (rms > error and not len(noisy)):
-        return np.arange(len(relative))
-    return noisy
-
-
-def _further_rays(taken):
-    """Rays of a replicate that the next pass adds: a power of two, so that neighbours share its even spread."""
-    return 2 ** np.ceil(np.log2(GROWTH * taken)).astype(np.int64)
+        wanting, _ = next_pass(due, taken, MOST_RAYS, cost, np.inf)
+        if extra > MOST_EXTRA or not len(wanting):
+            return ended()
+        active, further = next_pass(due, taken, MOST_RAYS, cost, min(budget - rays, in_time))
+        if len(active) < ENOUGH * len(wanting):
+            return ended("by the time limit" if in_time < budget - rays else "by the budget of rays")
 
 
 def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:
@@ -272,16 +291,8 @@ def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:
     return rays
 
 
-def _affordable(wanted, relative, further, cost, rays_left):
-    """Receivers that a pass can afford, the noisiest first, in order, and how many further rays each gets."""
-    if cost * further[wanted].sum() > rays_left:
-        further = np.maximum(further // 2, 1)  # fewer for all are worth more than all for some
-    noisiest = wanted[np.argsort(-relative[wanted], kind="stable")]
-    return np.sort(noisiest[np.cumsum(cost * further[noisiest]) <= rays_left]), further
-
-
 def _best_estimate(job, grid, means, direct, chosen, probes):
-    """Irradiance (N, 3), its relative noise (N,) and relative RMS error, from replicate means (N, R, 3).
+    """Irradiance (N, 3), its relative noise (N,), the probes' squared relative errors, of replicate means (N, R, 3).
 
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
     """
@@ -294,10 +305,7 @@ def _best_estimate(job, grid, means, direct, chosen, probes):
     for gathered, noise in estimates:
         values = (direct + gathered).astype(np.float32)
         scale = scale_of(values)
-        rms = probes.error_of(values[chosen], scale[chosen])
-        if best is None or rms < best[2]:
-            relative = np.sqrt(noise) / scale
-            # what the probes find and the replicates do not, is taken to be spread as the noise is
-            stated = np.sqrt(np.mean(relative[chosen] ** 2))
-            best = values, relative * min(max(rms / max(stated, 1e-12), 1.0), MOST_DOUBT), rms
+        squares = probes.squares_of(values[chosen], scale[chosen])
+        if best is None or rms_of(squares) < rms_of(best[2]):
+            best = values, np.sqrt(noise) / scale, squares
     return best

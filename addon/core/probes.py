@@ -50,12 +50,16 @@ class Measured:
     variance: np.ndarray
     rays: int
 
-    def error_of(self, values, scale) -> float:
-        """Relative RMS error of irradiance (M, 3); what the probes are uncertain by themselves is taken out."""
+    def squares_of(self, values, scale):
+        """Squared relative errors (M,) of irradiance (M, 3), without what the probes are uncertain by themselves."""
         # one wrong point counts as one, however wrong
         squares = np.minimum(((values @ LUMINANCE - self.luminance) / scale) ** 2, 1.0)
-        squares = squares - np.minimum(self.variance / scale**2, 1.0)
-        return float(np.sqrt(max(squares.mean(), 0.0))) if len(squares) else 0.0
+        return squares - np.minimum(self.variance / scale**2, 1.0)
+
+
+def rms_of(squares) -> float:
+    """Root of the mean of squared errors, of which some may be below 0 by noise; 0 of none."""
+    return float(np.sqrt(max(squares.mean(), 0.0))) if len(squares) else 0.0
 
 
 def chosen_receivers(count: int):

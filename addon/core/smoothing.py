@@ -55,6 +55,12 @@ def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Rec
     return TexelGrid(grid, spacing, charts.uvs, np.clip(colours, 0, 1))
 
 
+def blurred(workers: Workers, grid: TexelGrid, receivers: Receivers, means):
+    """Replicate means (N, R, 3) of gathered light over the nearest texels of the same surface: float32 (N, 3)."""
+    values = means.mean(axis=1, dtype=np.float32)
+    return smooth(workers, grid, receivers, values, np.zeros(len(values), np.float32), 1, False)[0]
+
+
 def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means):
     """Replicate means (N, R, 3) of gathered light, smoothed: values float32 (N, 3), variance of luminance (N,)."""
     values = means.mean(axis=1, dtype=np.float32)

@@ -78,6 +78,19 @@ bool pl_patches_fit(const pl_patches *patches, const pl_scene *scene) {
     return patches->triangle_count == scene->triangle_count;
 }
 
+/*
+ * Rays start no nearer than this to the edges of a triangle. Rounded to float32, what is nearer may lie beyond the wall
+ * that stands on the edge, and its light would leak: of some rays in ten million, but dark would not be exactly dark.
+ */
+static const float least_weight = 0x1p-18f;
+
+static pl_barycentric off_the_edges(float weight_1, float weight_2) {
+    weight_1 = fmaxf(weight_1, least_weight);
+    weight_2 = fmaxf(weight_2, least_weight);
+    const float scale = fminf(1, (1 - least_weight) / (weight_1 + weight_2));
+    return (pl_barycentric){weight_1 * scale, weight_2 * scale};
+}
+
 pl_barycentric point_in_patch(const pl_patches *patches, size_t patch, float x, float y) {
     const int32_t row = patches->patch_rows[patch];
     const int32_t triangle = patches->row_triangles[row];
@@ -97,7 +110,7 @@ pl_barycentric point_in_patch(const pl_patches *patches, size_t patch, float x, 
     weights[apex] = 1 - width;
     weights[(apex + 1) % 3] = width * (1 - across);
     weights[(apex + 2) % 3] = width * across;
-    return (pl_barycentric){weights[1], weights[2]};
+    return off_the_edges(weights[1], weights[2]);
 }
 
 pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, size_t count, uint32_t samples,

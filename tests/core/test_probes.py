@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.probes import MOST_OF_OBJECT, Measured, seen_through_corners, seen_through_lightmap
+from addon.core.probes import MOST_OF_OBJECT, Measured, rms_of, seen_through_corners, seen_through_lightmap
 from addon.core.receivers import vertex_receivers
 from addon.core.relative import scale_of
 from addon.core.settings import BakeSettings
@@ -65,7 +65,7 @@ def test_the_error_of_probes_takes_out_what_they_do_not_know():
     for wrong in (0.0, 0.05, 0.2):
         values = truth + wrong * rng.choice([-1.0, 1.0], 20000)[:, None]
         # 20000 squares of a normal number of variance 0.01 and more: their mean is known to 1e-4 and some
-        assert measured.error_of(values, 1.0) ** 2 == pytest.approx(wrong**2, abs=1.5e-3)
+        assert rms_of(measured.squares_of(values, 1.0)) ** 2 == pytest.approx(wrong**2, abs=1.5e-3)
 
 
 def test_the_scale_of_an_error_is_the_light_and_a_share_of_the_median():

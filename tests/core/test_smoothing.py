@@ -5,7 +5,7 @@ import pytest
 
 from addon.core.kernel import smooth
 from addon.core.receivers import Receivers
-from addon.core.smoothing import TexelGrid, smoothed
+from addon.core.smoothing import TexelGrid, blurred, smoothed
 from addon.core.workers import Workers
 from tests.reference import smoothing as reference
 
@@ -55,6 +55,17 @@ def test_a_level_is_what_its_definition_says(step, stops_on_value):
     # 25 weights of float32, the exponents known to 1e-6 of at most some tens
     assert found[0] == pytest.approx(exact[0], abs=3e-5)
     assert found[1] == pytest.approx(exact[1], abs=3e-6)
+
+
+def test_a_blur_keeps_the_light_that_few_rays_found():
+    grid, receivers = wall()
+    # one ray in ten finds a lamp: what smoothing takes for noise is all the light there is
+    found = 10.0 * (np.random.default_rng(4).random((SIDE * SIDE, 4, 1)) < 0.1) * np.ones(3)
+    with Workers(2) as workers:
+        light = blurred(workers, grid, receivers, found.astype(np.float32))
+    # the means of neighbours have the mean of all; only at borders do some count for more
+    assert light.mean() == pytest.approx(found.mean(), rel=0.01)
+    assert light.std() < 0.5 * found.mean(axis=1).std()
 
 
 def test_noise_falls_by_what_so_many_texels_are_worth():

@@ -161,6 +161,24 @@ static void points_come_back_to_their_patch(void) {
     pl_patches_destroy(patches);
 }
 
+/* A wall may stand on any edge: no point rounds to beyond it, whatever the numbers drawn, however far from the origin.
+ */
+static void points_keep_off_the_edges_of_their_triangle(void) {
+    const uint8_t apexes[] = {0, 1, 2};
+    const int32_t rows[] = {0, 1, 4, 9}, columns[] = {0, 1, 6, 9, 10, 17, 23, 28, 31, 32};
+    const float drawn[] = {0, 0x1p-32f, 0x1p-24f, 0.5f, 1 - 0x1p-24f};
+    pl_patches *patches = NULL;
+    CHECK(pl_patches_create(apexes, rows, 3, columns, 9, &patches) == PL_OK);
+    for (size_t patch = 0; patch < patches->patch_count; ++patch)
+        for (int i = 0; i < 5; ++i)
+            for (int j = 0; j < 5; ++j) {
+                const pl_barycentric b = point_in_patch(patches, patch, drawn[i], drawn[j]);
+                const float least = fminf(fminf(b.weight_1, b.weight_2), 1 - b.weight_1 - b.weight_2);
+                CHECK(least > 0x1p-19f); /* positions about as large as the triangle round by 2^-24 of it */
+            }
+    pl_patches_destroy(patches);
+}
+
 int main(void) {
     directions_are_those_of_the_polynomials();
     scrambling_keeps_the_net_and_changes_the_points();
@@ -168,5 +186,6 @@ int main(void) {
     directions_follow_the_cosine();
     bases_are_orthonormal();
     points_come_back_to_their_patch();
+    points_keep_off_the_edges_of_their_triangle();
     return 0;
 }
