@@ -53,8 +53,9 @@ def next_pass(due, taken, most, cost, rays_left):
     taken, most : (N,) rays that receivers have, and that one may have
     cost : rays traced for one of all replicates
     """
+    due = np.minimum(np.minimum(due, most), (1 + GROWTH) * taken)
     while True:
-        wanted = np.clip(np.minimum(due, most) - taken, 0, GROWTH * taken)
+        wanted = np.maximum(due - taken, 0)
         further = 2 ** np.floor(np.log2(np.maximum(wanted, 1))).astype(np.int64)
         active = np.flatnonzero(wanted >= np.maximum((WORTH - 1) * taken, 1))
         if cost * further[active].sum() <= rays_left or not len(active):

@@ -71,9 +71,9 @@ class KernelScene:
         _kernel.occluded(self._scene, _rows(points_from, np.float64), _rows(points_to, np.float64), out)
         return out.astype(bool)
 
-    def set_patches(self, apexes, first_rows, first_patches) -> None:
+    def set_patches(self, apexes, first_rows, first_cells, first_patches) -> None:
         """Cut the triangles into patches (layout: native/include/patchlight.h)."""
-        self._patches = _kernel.create_patches(apexes, first_rows, first_patches)
+        self._patches = _kernel.create_patches(apexes, first_rows, first_cells, first_patches)
         self.side_count = 2 * int(first_patches[-1])
 
     def patch_points(self, patches, samples, seed):

@@ -33,6 +33,7 @@ class Patches:
     bounds : float32 (P, 4) where each lies on its triangle: distance from the apex at its wide and its narrow end, and
         from the next corner to the one after at its first and its second side, all as shares
     apexes : uint8 (T,)
+    cells : int32 (P,) which cell of its triangle's grid each is, or is part of
     """
 
     size: float
@@ -41,6 +42,7 @@ class Patches:
     reflectance: np.ndarray
     bounds: np.ndarray
     apexes: np.ndarray
+    cells: np.ndarray
 
     def __len__(self) -> int:
         return len(self.areas)
@@ -73,41 +75,78 @@ def patch_size_for(scene: Scene, budget: int) -> float:
     return float(np.sqrt(high))
 
 
-def subdivide(scene: Scene, kernel: KernelScene, size: float, budget: int, seed: int) -> Patches:
-    """Cut every triangle into patches of at most about ``size`` [m] and tell the kernel of them."""
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """How every triangle is cut into rows of cells, each about as long as wide.
+
+    Attributes
+    ----------
+    size : longest edge of a cell, about [m]
+    areas : float64 (T,) of the triangles [m^2]
+    apexes : uint8 (T,)
+    first_rows, first_cells : int32, as in native/include/patchlight.h
+    """
+
+    size: float
+    areas: np.ndarray
+    apexes: np.ndarray
+    first_rows: np.ndarray
+    first_cells: np.ndarray
+
+    def __len__(self) -> int:
+        return int(self.first_cells[-1])
+
+
+def grid_of(scene: Scene, size: float, budget: int) -> Grid:
+    """The grid of cells of at most about ``size`` [m]."""
     areas = triangle_areas(scene)
     apexes, longest = _apexes(scene)
-    # a triangle that would take more than its share gets larger patches; a sliver takes them along its length
+    # a triangle that would take more than its share gets larger cells; a sliver takes them along its length
     share = budget * LARGEST_SHARE
     sizes = np.maximum(size, np.maximum(np.sqrt(areas / share), longest / share))
     _require_few(size, areas / sizes**2, len(areas))
     rows = np.maximum(1, np.ceil(2 * areas / np.maximum(longest * sizes, 1e-300) - 1e-6)).astype(np.int64)
     first_rows = _offsets(rows)
-
     row_triangle = np.repeat(np.arange(len(areas)), rows)
     row = np.arange(first_rows[-1]) - first_rows[row_triangle]
-    height = rows[row_triangle]
-    widths = longest[row_triangle] * (1 - row / height)
+    widths = longest[row_triangle] * (1 - row / rows[row_triangle])
     columns = np.maximum(1, np.ceil(widths / sizes[row_triangle] - 1e-6)).astype(np.int64)
-    first_patches = _offsets(columns)
-    kernel.set_patches(apexes, first_rows.astype(np.int32), first_patches.astype(np.int32))
+    return Grid(size, areas, apexes, first_rows.astype(np.int32), _offsets(columns).astype(np.int32))
 
-    # a row's share of the triangle: its width falls linearly, so area goes with the difference of squares
-    shares = ((1 - row / height) ** 2 - (1 - (row + 1) / height) ** 2) / columns
-    row_areas = areas[row_triangle] * shares
-    triangles = np.repeat(row_triangle, columns).astype(np.int32)
-    column = np.arange(first_patches[-1]) - np.repeat(first_patches[:-1], columns)
-    across = np.repeat(columns, columns)
-    ends = np.stack([1 - row / height, 1 - (row + 1) / height], axis=1)
-    bounds = np.concatenate([np.repeat(ends, columns, axis=0), np.stack([column, column + 1], 1) / across[:, None]], 1)
+
+def cut(scene: Scene, kernel: KernelScene, grid: Grid, along, seed: int) -> Patches:
+    """Patches of a grid, ``along`` (C,) of them along each side of every cell; the kernel is told of them."""
+    first_patches = _offsets(along**2)
+    kernel.set_patches(grid.apexes, grid.first_rows, grid.first_cells, first_patches.astype(np.int32))
+    rows, columns = np.diff(grid.first_rows), np.diff(grid.first_cells)
+    row_triangle = np.repeat(np.arange(len(rows)), rows)
+    cell_row = np.repeat(np.arange(len(columns)), columns)
+    cells = np.repeat(np.arange(len(grid)), along**2)
+    parts, part = along[cells], np.arange(len(cells)) - first_patches[cells]
+    of_row = cell_row[cells]
+    triangles = row_triangle[of_row]
+
+    height, width = rows[triangles] * parts, columns[of_row] * parts
+    row = (of_row - grid.first_rows[triangles]) * parts + part // parts
+    column = (cells - grid.first_cells[of_row]) * parts + part % parts
+    bounds = np.stack([1 - row / height, 1 - (row + 1) / height, column / width, (column + 1) / width], axis=1)
+    # the width of a triangle falls linearly towards its apex, so area goes with the difference of squares
+    shares = (bounds[:, 0] ** 2 - bounds[:, 1] ** 2) / width
     return Patches(
-        size=size,
-        areas=np.repeat(row_areas, columns),
-        triangles=triangles,
-        reflectance=_mean_reflectance(scene, kernel, triangles, seed),
+        size=grid.size,
+        areas=grid.areas[triangles] * shares,
+        triangles=triangles.astype(np.int32),
+        reflectance=_mean_reflectance(scene, kernel, triangles.astype(np.int32), seed),
         bounds=bounds.astype(np.float32),
-        apexes=apexes,
+        apexes=grid.apexes,
+        cells=cells.astype(np.int32),
     )
+
+
+def subdivide(scene: Scene, kernel: KernelScene, size: float, budget: int, seed: int) -> Patches:
+    """Cut every triangle into patches of at most about ``size`` [m], all alike, and tell the kernel of them."""
+    grid = grid_of(scene, size, budget)
+    return cut(scene, kernel, grid, np.ones(len(grid), np.int64), seed)
 
 
 def _require_few(size, pieces, triangle_count):

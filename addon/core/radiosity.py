@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .conjugate_gradient import require_exchange_size, solve_conjugate_gradient
+from .decomposition import finer
 from .dense import require_direct_size, solve_direct
 from .emitters import LUMINANCE, Emitters, with_sources
 from .exchange import exchange_of
 from .guides import no_guides
 from .kernel import KernelScene
-from .patches import Patches, patch_size_for, patch_triangles, subdivide, triangle_areas
+from .patches import Patches, cut, grid_of, patch_size_for, patch_triangles, subdivide, triangle_areas
 from .progressive import solve_progressive
 from .receivers import patch_receivers
 from .scene import Scene, exitance_from_radiance, radiance_from_exitance
@@ -25,6 +26,10 @@ from .transport import form_factors
 EVEN, MIXED_SIDE, LIGHT = 0, 1, 2  # kinds of sides, as the kernel has them
 # patches, about, that each solver is given; triangles are never joined, so there may be more
 PATCH_BUDGETS = {"direct": 1200, "conjugate-gradient": 5000, "progressive": 3000, "stochastic": 60000}
+COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
+ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
+QUICK_ERROR = 0.2  # of the solutions that say where it does
+LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 EXCHANGE_TRIANGLES = 3000  # up to which "auto" takes conjugate gradients, which keep 4 n^2 bytes
 BRIGHT_ROOM = 0.8  # mean reflectance from which conjugate gradients need less time than stochastic Jacobi
 POINTS = 8  # of a patch side: where its direct light is measured
@@ -102,31 +107,59 @@ class Solved:
 def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, on_step) -> Solved:
     """Subdivide, measure direct light on the patches, solve for the light that bounces."""
     solver, method, choice = choose(settings, len(scene.triangles), _mean_reflectance(scene))
-    budget = PATCH_BUDGETS[solver]
-    size = settings.patch_size or patch_size_for(scene, budget)
-    patches = subdivide(scene, kernel, size, budget, settings.seed)
     sky = np.asarray(exitance_from_radiance(scene.world_radiance), np.float32).reshape(1, 3)
-    direct, spread, traced = _direct_on_patches(
-        scene, kernel, patches, emitters, settings.seed, lambda done: on_step(0.4 * done)
-    )
-    daylight, sky_rays = _sky_on_patches(scene, kernel, patches, emitters, sky, settings.seed)
-    emitted = patches.side_reflectance * (direct + daylight)
-    solution = solve_patches(kernel, patches, emitted, solver, method, settings, lambda done: on_step(0.5 + 0.5 * done))
 
+    def measure(patches, known=None):
+        return _light_on_patches(scene, kernel, patches, emitters, sky, settings.seed, known)
+
+    def solve(lit, error, on_step):
+        emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
+        precision = replace(settings, error=error)
+        return solve_patches(kernel, lit.patches, emitted, solver, method, precision, on_step)
+
+    budget = PATCH_BUDGETS[solver]
+    if settings.patch_size or solver == "stochastic":
+        # where a patch costs rays only, as many of one size are as good in the same time
+        size = settings.patch_size or patch_size_for(scene, budget)
+        lit = measure(subdivide(scene, kernel, size, budget, settings.seed))
+    else:
+        lit = _decompose(scene, kernel, budget, settings, measure, solve)
+    on_step(0.5)
+    solution = solve(lit, settings.error, lambda done: on_step(0.5 + 0.5 * done))
+
+    patches = lit.patches
     reaches = _reaches(kernel, patches, settings.seed)
-    kinds, bright = _side_kinds(patches, solution.radiosity, spread, np.isinf(reaches))
+    kinds, bright = _side_kinds(patches, solution.radiosity, lit.spread, np.isinf(reaches))
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),
-        direct=(patches.side_reflectance * direct).astype(np.float32),
+        direct=(patches.side_reflectance * lit.direct).astype(np.float32),
         reflectance=np.ascontiguousarray(patches.reflectance, np.float32),
         kinds=kinds,
         reaches=reaches,
         sky=sky,
     )
     sources = _as_sources(scene, kernel, patches, emitters, solution.radiosity, bright)
-    return Solved(
-        field, emitters, sources, solution, method, choice, {"patches": traced + sky_rays, "solve": solution.rays}
-    )
+    return Solved(field, emitters, sources, solution, method, choice, {"patches": lit.rays, "solve": solution.rays})
+
+
+def _decompose(scene, kernel, budget, settings, measure, solve) -> _Lit:
+    """Patches that are small where the light changes, and the light on them."""
+    coarse = int(budget * COARSE_SHARE)
+    grid = grid_of(scene, patch_size_for(scene, coarse), coarse)
+    along = np.ones(len(grid), np.int64)
+    lit = measure(cut(scene, kernel, grid, along, settings.seed))
+    count = len(lit.patches)
+    for share in ROUND_SHARES:
+        first = solve(lit, max(settings.error, QUICK_ERROR), lambda done: None)
+        reflectance = np.maximum(lit.patches.side_reflectance, LEAST_REFLECTANCE)
+        irradiance = (first.radiosity / reflectance) @ LUMINANCE
+        finer_along = finer(grid, along, lit.patches, irradiance, lit.spread, count + int(share * budget))
+        lit = replace(lit, rays=lit.rays + first.rays)
+        if (finer_along == along).all():
+            break
+        along = finer_along
+        lit = measure(cut(scene, kernel, grid, along, settings.seed), lit)
+    return lit
 
 
 def _side_kinds(patches, radiosity, spread, is_confined):
@@ -227,7 +260,32 @@ def _mean_reflectance(scene):
     return float((areas * np.array(brightest)[scene.triangle_materials]).sum() / max(areas.sum(), 1e-300))
 
 
-def _direct_on_patches(scene, kernel, patches: Patches, emitters, seed, on_step):
+@dataclass(frozen=True, slots=True)
+class _Lit:
+    """Mean irradiance of every patch side by the lights and by the world (2 P, 3), the spread of the former (2 P,)."""
+
+    patches: Patches
+    direct: np.ndarray
+    spread: np.ndarray
+    daylight: np.ndarray
+    rays: int
+
+
+def _light_on_patches(scene, kernel, patches: Patches, emitters, sky, seed, known: _Lit | None) -> _Lit:
+    """Direct light on patches; on those of cells that are as they were in ``known``, what was measured there."""
+    new, old = np.ones(len(patches), bool), np.zeros(0, bool)
+    if known is not None:
+        is_same = np.bincount(patches.cells) == np.bincount(known.patches.cells)
+        new, old = ~is_same[patches.cells], is_same[known.patches.cells]
+    direct, spread, shadow_rays = _direct_on_patches(scene, kernel, patches, new, emitters, seed)
+    daylight, sky_rays = _sky_on_patches(scene, kernel, patches, new, emitters, sky, seed)
+    if known is not None:
+        for all_of_them, before in ((direct, known.direct), (spread, known.spread), (daylight, known.daylight)):
+            all_of_them[np.repeat(~new, 2)] = before[np.repeat(old, 2)]
+    return _Lit(patches, direct, spread, daylight, shadow_rays + sky_rays + (known.rays if known else 0))
+
+
+def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, seed):
     """The lights' mean irradiance on every side, float64 (2 P, 3), its spread over the side (2 P,), and shadow rays.
 
     A full-size patch is measured at several points; a small one at one, as its neighbours stand in for it when light is
@@ -235,18 +293,17 @@ def _direct_on_patches(scene, kernel, patches: Patches, emitters, seed, on_step)
     """
     irradiance, spread = np.zeros((len(patches), 2, 3)), np.zeros((len(patches), 2))
     rays = 0
-    for chosen, points, share in _measured(patches):
+    for chosen, points in _measured(patches, wanted):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
         values, _, traced = kernel.direct(emitters, receivers, min(points, PATCH_SHADOW_SAMPLES), seed)
         values = values.reshape(-1, 2, points, 3)
         irradiance[chosen] = values.mean(axis=2, dtype=np.float64)
         spread[chosen] = np.ptp(values.mean(axis=3), axis=2)
         rays += traced
-        on_step(share)
     return irradiance.reshape(-1, 3), spread.ravel(), rays
 
 
-def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):
+def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, seed):
     """Mean irradiance of every side from the constant world, float64 (2 P, 3), and the rays it took.
 
     The sky is gathered with all surfaces black.
@@ -262,7 +319,7 @@ def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):
         reaches=np.zeros(kernel.side_count, np.float32),
         sky=sky,
     )
-    for chosen, points, _ in _measured(patches):
+    for chosen, points in _measured(patches, wanted):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
         sums = np.zeros((len(receivers), 1, 3), np.float32)
         everyone = np.arange(len(receivers), dtype=np.uint32)
@@ -274,11 +331,9 @@ def _sky_on_patches(scene, kernel, patches: Patches, emitters, sky, seed):
     return irradiance.reshape(-1, 3), rays
 
 
-def _measured(patches: Patches):
-    """(patches, points on each, share of the work done after them): the full-size ones, and the small ones."""
-    reflects = patches.reflectance.max(axis=1, initial=0.0) > 0
-    is_large = patches.areas > SMALL * patches.size**2
-    return (
-        (np.flatnonzero(is_large & reflects), POINTS, 0.5),
-        (np.flatnonzero(~is_large & reflects), 1, 1.0),
-    )
+def _measured(patches: Patches, wanted):
+    """(patches, points on each) of those wanted that reflect: those of a full-size cell, and of small ones."""
+    wanted = wanted & (patches.reflectance.max(axis=1, initial=0.0) > 0)
+    cell_areas = np.bincount(patches.cells, patches.areas)
+    is_large = cell_areas[patches.cells] > SMALL * patches.size**2
+    return (np.flatnonzero(is_large & wanted), POINTS), (np.flatnonzero(~is_large & wanted), 1)

@@ -10,13 +10,16 @@ from . import kernel
 from .charts import Charts
 from .z_order import z_order
 
+INSET = 0.25  # texels inside a chart's edge, for texels whose centres are outside; half-way where a triangle is thinner
+
 
 @dataclass(frozen=True, slots=True)
 class TexelMap:
     """Receivers, along a Z-shaped curve through the lightmap: those that follow each other are near on the surface.
 
     A texel is a receiver where the square over which bilinear lookup spreads it meets a chart; it stands for its own
-    centre, or where that is outside, for the chart's nearest point.
+    centre, or where that is outside, for a point a little inside the chart's nearest edge: right on it there often
+    stands a wall, and light or shadow beside that would spread over half a texel.
 
     Attributes
     ----------
@@ -45,12 +48,43 @@ def texels(charts: Charts) -> TexelMap:
     rows, columns = np.nonzero(triangles >= 0)
     order = np.argsort(z_order(columns, rows))
     rows, columns = rows[order], columns[order]
+    triangles, weights, is_inside = triangles[rows, columns], barycentrics[rows, columns], distances[rows, columns] == 0
+    outside = np.flatnonzero(~is_inside)
+    centres = np.stack([columns, rows], axis=1)[outside] + 0.5
+    weights[outside] = _further_in(charts.uvs[triangles[outside]].astype(np.float64), centres, weights[outside])
     return TexelMap(
-        rows.astype(np.int32),
-        columns.astype(np.int32),
-        triangles[rows, columns],
-        barycentrics[rows, columns],
-        distances[rows, columns] == 0,
-        charts.width,
-        charts.height,
+        rows.astype(np.int32), columns.astype(np.int32), triangles, weights, is_inside, charts.width, charts.height
     )
+
+
+def _further_in(corners, centres, weights):
+    """Barycentrics (K, 3) of the points INSET further into triangles (K, 3, 2) than those nearest to ``centres``."""
+    points = np.einsum("nk,nkc->nc", weights, corners)
+    ahead = points - centres
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    inwards = _change_of_weights(corners, ahead)
+    # from a corner the way ahead may lead out again: then towards the middle
+    length = _way_out(weights, inwards)
+    middle = corners.mean(axis=1) - points
+    far = np.maximum(np.linalg.norm(middle, axis=1), 1e-30)
+    to_middle = (1 / 3 - weights) / far[:, None]
+    leads_out = length < 1e-3
+    inwards = np.where(leads_out[:, None], to_middle, inwards)
+    length = np.where(leads_out, 2 * far, length)
+    return (weights + np.minimum(INSET, length / 2)[:, None] * inwards).astype(np.float32)
+
+
+def _change_of_weights(corners, direction):
+    """What barycentrics (K, 3) of triangles (K, 3, 2) change by, a texel along directions (K, 2); 0 without an area."""
+    opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    turned = opposite[..., 0] * direction[:, None, 1] - opposite[..., 1] * direction[:, None, 0]
+    u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])[:, None]
+    return np.where(np.abs(area) > 1e-12, turned / np.where(area == 0, 1, area), 0.0)
+
+
+def _way_out(weights, change):
+    """How far (K,) it goes on inside, at least; 0 where it goes nowhere."""
+    with np.errstate(divide="ignore"):
+        steps = np.where(change < -1e-12, weights / np.maximum(-change, 1e-12), np.inf).min(axis=1)
+    return np.where(np.isfinite(steps), steps, 0.0)

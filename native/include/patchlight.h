@@ -77,18 +77,26 @@ void pl_closest_hits(const pl_scene *scene, const double *origins, const float *
 void pl_occluded(const pl_scene *scene, const double *from, const double *to, size_t count, uint8_t *out_occluded);
 
 /*
- * How triangles are cut into patches: rows parallel to the longest edge, columns across each row that
- * run towards the opposite corner, the apex. A row's columns have equal areas, a triangle's rows equal
- * heights, so point -> patch and patch -> point are closed forms.
+ * How triangles are cut into patches: rows parallel to the longest edge, cells across each row that run towards the
+ * opposite corner, the apex; a cell is one patch, or a square number of them where more is to be told apart. A row's
+ * cells have equal areas, a triangle's rows equal heights, so point -> patch and patch -> point are closed forms.
  *
  *   apexes         triangle_count: which corner (0..2) is the apex
  *   first_rows     triangle_count + 1: triangle t has rows first_rows[t] .. first_rows[t + 1] - 1, row 0
  *                  along the longest edge
- *   first_patches  row_count + 1: row r has patches first_patches[r] .. first_patches[r + 1] - 1
+ *   first_cells    row_count + 1: row r has cells first_cells[r] .. first_cells[r + 1] - 1
+ *   first_patches  cell_count + 1: cell c has patches first_patches[c] .. first_patches[c + 1] - 1, a square number,
+ *                  n times n, n at most PL_MOST_ALONG: n rows of equal height, in the order of the triangle's,
+ *                  of n columns each
  */
+enum { PL_MOST_ALONG = 16 };
+typedef struct pl_patch_layout {
+    const uint8_t *apexes;
+    const int32_t *first_rows, *first_cells, *first_patches;
+    size_t triangle_count, row_count, cell_count;
+} pl_patch_layout;
 typedef struct pl_patches pl_patches;
-pl_status pl_patches_create(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
-                            const int32_t *first_patches, size_t row_count, pl_patches **out_patches);
+pl_status pl_patches_create(const pl_patch_layout *layout, pl_patches **out_patches);
 void pl_patches_destroy(pl_patches *patches);
 size_t pl_patches_count(const pl_patches *patches);
 /* Whether the patches have the scene's number of triangles: whoever takes both relies on it. */

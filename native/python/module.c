@@ -108,21 +108,29 @@ static PyObject *occluded(PyObject *self, PyObject *args) {
 }
 
 static PyObject *create_patches(PyObject *self, PyObject *args) {
-    PyObject *objects[3];
+    PyObject *objects[4];
     pl_patches *patches = NULL;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOO", &objects[0], &objects[1], &objects[2]))
+    if (!PyArg_ParseTuple(args, "OOOO", &objects[0], &objects[1], &objects[2], &objects[3]))
         return NULL;
     door_array arrays[] = {{"apexes", 'B', 1, -1, false, {0}},
                            {"first_rows", 'i', 1, -1, false, {0}},
+                           {"first_cells", 'i', 1, -1, false, {0}},
                            {"first_patches", 'i', 1, -1, false, {0}}};
-    if (!door_arrays(objects, arrays, 3))
+    if (!door_arrays(objects, arrays, 4))
         return NULL;
     pl_status status = PL_ERR_ARGUMENT;
-    if (door_rows(&arrays[1]) == door_rows(&arrays[0]) + 1 && door_rows(&arrays[2]) > 0)
-        status = pl_patches_create(arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
-                                   door_rows(&arrays[2]) - 1, &patches);
-    door_release(arrays, 3);
+    if (door_rows(&arrays[1]) == door_rows(&arrays[0]) + 1 && door_rows(&arrays[2]) > 0 && door_rows(&arrays[3]) > 0) {
+        const pl_patch_layout layout = {.apexes = arrays[0].view.buf,
+                                        .first_rows = arrays[1].view.buf,
+                                        .first_cells = arrays[2].view.buf,
+                                        .first_patches = arrays[3].view.buf,
+                                        .triangle_count = door_rows(&arrays[0]),
+                                        .row_count = door_rows(&arrays[2]) - 1,
+                                        .cell_count = door_rows(&arrays[3]) - 1};
+        status = pl_patches_create(&layout, &patches);
+    }
+    door_release(arrays, 4);
     return status == PL_OK ? PyCapsule_New(patches, PATCHES, destroy_patches) : door_result(status);
 }
 
@@ -330,7 +338,8 @@ static PyMethodDef methods[] = {
     {"scene_centre", scene_centre, METH_O, "scene_centre(scene) -> (x, y, z)"},
     {"closest_hits", closest_hits, METH_VARARGS, "closest_hits(scene, origins, directions, out_triangles, out_hits)"},
     {"occluded", occluded, METH_VARARGS, "occluded(scene, points_from, points_to, out_occluded)"},
-    {"create_patches", create_patches, METH_VARARGS, "create_patches(apexes, first_rows, first_patches) -> patches"},
+    {"create_patches", create_patches, METH_VARARGS,
+     "create_patches(apexes, first_rows, first_cells, first_patches) -> patches"},
     {"patch_points", patch_points, METH_VARARGS,
      "patch_points(layout, patches, samples, seed, out_triangles, out_barycentrics)"},
     {"form_factors_monte_carlo", form_factors_monte_carlo, METH_VARARGS,

@@ -11,13 +11,25 @@ static bool is_rising(const int32_t *offsets, size_t count) {
     return offsets[0] == 0;
 }
 
-static bool layout_is_valid(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
-                            const int32_t *first_patches, size_t row_count) {
-    for (size_t t = 0; t < triangle_count; ++t)
-        if (apexes[t] > 2)
+static bool are_squares(const int32_t *offsets, size_t count) {
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t root = (int32_t)(sqrtf((float)(offsets[i + 1] - offsets[i])) + 0.5f);
+        if (root > PL_MOST_ALONG || root * root != offsets[i + 1] - offsets[i])
             return false;
-    return is_rising(first_rows, triangle_count) && (size_t)first_rows[triangle_count] == row_count &&
-           is_rising(first_patches, row_count);
+    }
+    return true;
+}
+
+static bool layout_is_valid(const pl_patch_layout *layout) {
+    for (size_t t = 0; t < layout->triangle_count; ++t)
+        if (layout->apexes[t] > 2)
+            return false;
+    return is_rising(layout->first_rows, layout->triangle_count) &&
+           (size_t)layout->first_rows[layout->triangle_count] == layout->row_count &&
+           is_rising(layout->first_cells, layout->row_count) &&
+           (size_t)layout->first_cells[layout->row_count] == layout->cell_count &&
+           is_rising(layout->first_patches, layout->cell_count) &&
+           are_squares(layout->first_patches, layout->cell_count);
 }
 
 static int32_t *copy_of(const int32_t *numbers, size_t count) {
@@ -36,27 +48,29 @@ static int32_t *owners(const int32_t *offsets, size_t count) {
     return owner;
 }
 
-pl_status pl_patches_create(const uint8_t *apexes, const int32_t *first_rows, size_t triangle_count,
-                            const int32_t *first_patches, size_t row_count, pl_patches **out_patches) {
-    if (!layout_is_valid(apexes, first_rows, triangle_count, first_patches, row_count))
+pl_status pl_patches_create(const pl_patch_layout *layout, pl_patches **out_patches) {
+    if (!layout_is_valid(layout))
         return PL_ERR_ARGUMENT;
     pl_patches *patches = calloc(1, sizeof *patches);
     if (!patches)
         return PL_ERR_MEMORY;
-    patches->triangle_count = triangle_count;
-    patches->row_count = row_count;
-    patches->patch_count = (size_t)first_patches[row_count];
-    patches->apexes = malloc(triangle_count + 1);
-    patches->first_rows = copy_of(first_rows, triangle_count + 1);
-    patches->first_patches = copy_of(first_patches, row_count + 1);
-    patches->patch_rows = owners(first_patches, row_count);
-    patches->row_triangles = owners(first_rows, triangle_count);
-    if (!patches->apexes || !patches->first_rows || !patches->first_patches || !patches->patch_rows ||
-        !patches->row_triangles) {
+    patches->triangle_count = layout->triangle_count;
+    patches->row_count = layout->row_count;
+    patches->cell_count = layout->cell_count;
+    patches->patch_count = (size_t)layout->first_patches[layout->cell_count];
+    patches->apexes = malloc(layout->triangle_count + 1);
+    patches->first_rows = copy_of(layout->first_rows, layout->triangle_count + 1);
+    patches->first_cells = copy_of(layout->first_cells, layout->row_count + 1);
+    patches->first_patches = copy_of(layout->first_patches, layout->cell_count + 1);
+    patches->patch_cells = owners(layout->first_patches, layout->cell_count);
+    patches->cell_rows = owners(layout->first_cells, layout->row_count);
+    patches->row_triangles = owners(layout->first_rows, layout->triangle_count);
+    if (!patches->apexes || !patches->first_rows || !patches->first_cells || !patches->first_patches ||
+        !patches->patch_cells || !patches->cell_rows || !patches->row_triangles) {
         pl_patches_destroy(patches);
         return PL_ERR_MEMORY;
     }
-    memcpy(patches->apexes, apexes, triangle_count);
+    memcpy(patches->apexes, layout->apexes, layout->triangle_count);
     *out_patches = patches;
     return PL_OK;
 }
@@ -66,8 +80,10 @@ void pl_patches_destroy(pl_patches *patches) {
         return;
     free(patches->apexes);
     free(patches->first_rows);
+    free(patches->first_cells);
     free(patches->first_patches);
-    free(patches->patch_rows);
+    free(patches->patch_cells);
+    free(patches->cell_rows);
     free(patches->row_triangles);
     free(patches);
 }
@@ -92,18 +108,21 @@ static pl_barycentric off_the_edges(float weight_1, float weight_2) {
 }
 
 pl_barycentric point_in_patch(const pl_patches *patches, size_t patch, float x, float y) {
-    const int32_t row = patches->patch_rows[patch];
+    const int32_t cell = patches->patch_cells[patch], row = patches->cell_rows[cell];
     const int32_t triangle = patches->row_triangles[row];
     const int32_t first_row = patches->first_rows[triangle];
-    const float rows = (float)(patches->first_rows[triangle + 1] - first_row);
-    const int32_t first = patches->first_patches[row];
-    const float columns = (float)(patches->first_patches[row + 1] - first);
+    const float along = (float)patches_along(patches, cell);
+    const float rows = along * (float)(patches->first_rows[triangle + 1] - first_row);
+    const float columns = along * (float)(patches->first_cells[row + 1] - patches->first_cells[row]);
+    const int32_t part = (int32_t)patch - patches->first_patches[cell];
+    const float i = along * (float)(row - first_row) + (float)(part / (int32_t)along);
+    const float j = along * (float)(cell - patches->first_cells[row]) + (float)(part % (int32_t)along);
 
     /* the width of the triangle falls linearly towards the apex: area goes with the width's square */
-    const float wide = 1 - (float)(row - first_row) / rows;
-    const float narrow = fmaxf(0, 1 - (float)(row - first_row + 1) / rows);
+    const float wide = 1 - i / rows;
+    const float narrow = fmaxf(0, 1 - (i + 1) / rows);
     const float width = sqrtf(wide * wide + x * (narrow * narrow - wide * wide));
-    const float across = ((float)((int32_t)patch - first) + y) / columns;
+    const float across = (j + y) / columns;
 
     float weights[3];
     const int apex = patches->apexes[triangle];

@@ -8,10 +8,12 @@
 struct pl_patches {
     uint8_t *apexes;
     int32_t *first_rows;
+    int32_t *first_cells;
     int32_t *first_patches;
-    int32_t *patch_rows; /* which row each patch is in */
+    int32_t *patch_cells; /* which cell each patch is part of, which row that is in */
+    int32_t *cell_rows;
     int32_t *row_triangles;
-    size_t triangle_count, row_count, patch_count;
+    size_t triangle_count, row_count, cell_count, patch_count;
 };
 
 /* Weights of a triangle's corners 1 and 2. */
@@ -19,22 +21,38 @@ typedef struct pl_barycentric {
     float weight_1, weight_2;
 } pl_barycentric;
 
-/* Corner weights as seen from the apex: b and c follow it in order, s = 1 - weight of the apex. */
+/* Along each side of a cell lie so many patches. */
+static inline int32_t patches_along(const pl_patches *patches, int32_t cell) {
+    return (int32_t)(sqrtf((float)(patches->first_patches[cell + 1] - patches->first_patches[cell])) + 0.5f);
+}
+
+static inline int32_t part_at(float share, int32_t parts) {
+    const int32_t part = (int32_t)(share * (float)parts);
+    return part < parts ? part : parts - 1;
+}
+
+/* Seen from the apex: `down` from its opposite edge to it, `across` from the next corner to the one after. */
 static inline int32_t patch_at(const pl_patches *patches, int32_t triangle, float u, float v) {
     const int32_t first_row = patches->first_rows[triangle];
     const int32_t rows = patches->first_rows[triangle + 1] - first_row;
     const float weights[3] = {1 - u - v, u, v};
     const int apex = patches->apexes[triangle];
-    const float apex_weight = fminf(fmaxf(weights[apex], 0), 1);
-    int32_t row = (int32_t)(apex_weight * (float)rows);
-    row = first_row + (row < rows ? row : rows - 1);
-    const int32_t first = patches->first_patches[row];
-    const int32_t columns = patches->first_patches[row + 1] - first;
-    if (columns == 1)
+    const float down = fminf(fmaxf(weights[apex], 0), 1);
+    const int32_t row = part_at(down, rows);
+    const int32_t first_cell = patches->first_cells[first_row + row];
+    const int32_t columns = patches->first_cells[first_row + row + 1] - first_cell;
+    const int32_t first = patches->first_patches[first_cell];
+    if (columns == 1 && patches->first_patches[first_cell + 1] == first + 1)
         return first;
-    const float across = weights[apex == 0 ? 2 : apex == 1 ? 0 : 1] / fmaxf(1 - apex_weight, 1e-30f);
-    const int32_t column = (int32_t)(fminf(fmaxf(across, 0), 1) * (float)columns);
-    return first + (column < columns ? column : columns - 1);
+    const float weight_after = weights[apex == 0 ? 2 : apex == 1 ? 0 : 1];
+    const float across = fminf(fmaxf(weight_after / fmaxf(1 - down, 1e-30f), 0), 1);
+    const int32_t column = part_at(across, columns);
+    const int32_t along = patches_along(patches, first_cell + column);
+    if (along == 1)
+        return patches->first_patches[first_cell + column];
+    const int32_t i = part_at(down * (float)rows - (float)row, along);
+    const int32_t j = part_at(across * (float)columns - (float)column, along);
+    return patches->first_patches[first_cell + column] + i * along + j;
 }
 
 static inline size_t hit_side(const pl_patches *patches, const pl_hit *hit) {
@@ -42,7 +60,7 @@ static inline size_t hit_side(const pl_patches *patches, const pl_hit *hit) {
 }
 
 static inline int32_t patch_triangle(const pl_patches *patches, size_t patch) {
-    return patches->row_triangles[patches->patch_rows[patch]];
+    return patches->row_triangles[patches->cell_rows[patches->patch_cells[patch]]];
 }
 
 /* The point of a patch that (x, y) of the unit square maps to, evenly by area. */

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.patches import LARGEST_SHARE, patch_size_for, subdivide, triangle_areas
+from addon.core.patches import LARGEST_SHARE, cut, grid_of, patch_size_for, subdivide, triangle_areas
 from addon.core.scene import Material, Texture
 from tests.reference.patches import area_share, depth_in, patch_polygons
 from tests.scenes import Part, cornell_box, kernel_of, rectangle, scene_of
@@ -37,6 +37,32 @@ def test_points_of_a_patch_lie_in_it_and_areas_are_those_of_the_polygons(seed):
     assert patches.areas / triangle_areas(scene)[0] == pytest.approx(shares, rel=1e-9)
     depths = [depth_in(p, w) for p, w in zip(polygons, weights.reshape(-1, 64, 3).astype(float))]
     assert np.min(depths) > -1e-6  # float32 weights
+
+
+def test_patches_of_cells_that_are_cut_finer_make_up_their_cell():
+    """Areas add up to the whole cell's, bounds to its bounds, and points lie within them."""
+    scene = one_triangle(np.random.default_rng(9))
+    grid = grid_of(scene, 0.3 * np.sqrt(triangle_areas(scene)[0]), 10_000)
+    along = np.random.default_rng(10).choice([1, 2, 4, 5], len(grid))
+    with kernel_of(scene) as kernel:
+        whole = cut(scene, kernel, grid, np.ones(len(grid), np.int64), 0)
+        fine = cut(scene, kernel, grid, along, 0)
+        _, weights = kernel.patch_points(np.arange(len(fine)), 64, 0)
+    assert len(fine) == (along**2).sum()
+    assert np.bincount(fine.cells, fine.areas) == pytest.approx(whole.areas, rel=1e-12)
+    order = np.argsort(fine.cells, kind="stable")
+    starts = np.searchsorted(fine.cells[order], np.arange(len(grid)))
+    for column, outermost in enumerate((np.maximum, np.minimum, np.minimum, np.maximum)):
+        assert outermost.reduceat(fine.bounds[order, column], starts) == pytest.approx(
+            whole.bounds[:, column], abs=1e-6
+        )
+    apex = int(fine.apexes[0])
+    weights = weights.reshape(len(fine), 64, 3).astype(np.float64)
+    width, after = 1 - weights[..., apex], weights[..., (apex + 2) % 3]
+    wide, narrow, first, second = fine.bounds.T[:, :, None]
+    # float32, and points keep 4e-6 off the triangle's edges
+    assert ((width < wide + 1e-5) & (width > narrow - 1e-5)).all()
+    assert ((after < second * width + 1e-5) & (after > first * width - 1e-5)).all()
 
 
 @pytest.mark.parametrize("seed", range(6))

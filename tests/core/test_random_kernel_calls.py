@@ -51,9 +51,10 @@ def kernels(draw):
     rows = np.resize([1, 2], len(triangles))
     first_rows = np.concatenate([[0], np.cumsum(rows)]).astype(np.int32)
     columns = np.resize([1, 3, 2], first_rows[-1])
-    first_patches = np.concatenate([[0], np.cumsum(columns)]).astype(np.int32)
+    first_cells = np.concatenate([[0], np.cumsum(columns)]).astype(np.int32)
+    first_patches = np.concatenate([[0], np.cumsum(np.resize([1, 4, 1, 9], first_cells[-1]))]).astype(np.int32)
     apexes = np.resize(np.uint8([0, 1, 2]), len(triangles)).astype(np.uint8)
-    return scene, _kernel.create_patches(apexes, first_rows, first_patches), int(first_patches[-1])
+    return scene, _kernel.create_patches(apexes, first_rows, first_cells, first_patches), int(first_patches[-1])
 
 
 def light_table(draw):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from addon.core import kernel
 from addon.core.charts import Charts
-from addon.core.texels import texels
+from addon.core.texels import INSET, texels
 from tests.reference import texels as reference
 
 WIDTH, HEIGHT = 13, 9
@@ -124,3 +124,30 @@ def test_a_lightmap_without_texels_is_refused(width, height):
     empty = np.empty(0, np.int32), np.empty(0, np.float32), np.empty((0, 3), np.float32)
     with pytest.raises(ValueError, match=r"\w"):
         _kernel.rasterise_texels(np.zeros((1, 3, 2), np.float32), width, height, *empty)
+
+
+@given(
+    st.lists(st.tuples(st.floats(1, 15), st.floats(1, 15)), min_size=3, max_size=12).map(lambda c: c[: len(c) // 3 * 3])
+)
+def test_what_stands_for_texels_outside_is_inside_a_chart_off_its_edge(corners):
+    uvs = np.array(corners, np.float32).reshape(-1, 3, 2)
+    found = texels(Charts(uvs, np.zeros(len(uvs), np.int32), 16, 16))
+    assert (found.barycentrics >= -1e-6).all()  # float32
+    assert found.barycentrics.sum(axis=1) == pytest.approx(1, abs=1e-5)
+    at = np.einsum("nk,nkc->nc", found.barycentrics, uvs[found.triangles].astype(np.float64))
+    moved = np.linalg.norm(at - np.stack([found.columns, found.rows], 1) - 0.5, axis=1)
+    nearest = kernel.rasterise_texels(uvs, 16, 16)[1][found.rows, found.columns]
+    # no further than INSET beyond what is nearest; float32 positions of 15
+    assert (moved <= nearest + INSET + 1e-5).all()
+
+
+def test_the_point_for_a_texel_outside_is_a_quarter_texel_in_or_half_way():
+    wide = np.float32([[[1.8, 1.8], [9.8, 1.8], [1.8, 9.8]]])
+    found = texels(Charts(wide, np.zeros(1, np.int32), 12, 12))
+    below = np.flatnonzero((found.rows == 1) & (found.columns == 4))
+    assert found.barycentrics[below] @ wide[0, :, 1] == pytest.approx(1.8 + INSET, abs=1e-5)
+    thin = np.float32([[[1.5, 1.8], [8.5, 1.8], [8.5, 2.0]]])
+    found = texels(Charts(thin, np.zeros(1, np.int32), 12, 4))
+    below = np.flatnonzero((found.rows == 1) & (found.columns == 6))
+    # 5 of its 7 texels along, the strip is 1/7 texel wide
+    assert found.barycentrics[below] @ thin[0, :, 1] == pytest.approx(1.8 + 0.5 / 7, abs=1e-5)

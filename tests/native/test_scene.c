@@ -71,10 +71,11 @@ static void directions_need_not_be_unit(const pl_scene *scene) {
 static void rows_are_finite_and_closed(const pl_scene *scene) {
     enum { SIDES = 8 };
     const uint8_t apexes[] = {0, 0, 0, 0};
-    const int32_t rows[] = {0, 1, 2, 3, 4}, columns[] = {0, 1, 2, 3, 4}, sides[] = {0, 2, 4, 6};
+    const int32_t one_each[] = {0, 1, 2, 3, 4}, sides[] = {0, 2, 4, 6};
     pl_patches *patches = NULL;
     float factors[4 * SIDES];
-    CHECK(pl_patches_create(apexes, rows, 4, columns, 4, &patches) == PL_OK);
+    const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 4, 4, 4};
+    CHECK(pl_patches_create(&layout, &patches) == PL_OK);
     for (int estimator = 0; estimator < 2; ++estimator) {
         const pl_status status = estimator ? pl_form_factors_hemicube(scene, patches, sides, 4, 8, 4, 1, factors)
                                            : pl_form_factors_monte_carlo(scene, patches, sides, 4, 512, 1, factors);
@@ -99,14 +100,15 @@ static void rows_are_finite_and_closed(const pl_scene *scene) {
 /* A patch without area sends rays nowhere sensible, but never a number that is none. */
 static void form_factors_of_a_triangle_without_area_are_finite(const pl_embree *embree) {
     const double vertices[] = {0, 0, 0, 1, 0, 0, 2, 0, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1};
-    const int32_t triangles[] = {0, 1, 2, 3, 4, 5}, rows[] = {0, 1, 2}, columns[] = {0, 1, 2};
+    const int32_t triangles[] = {0, 1, 2, 3, 4, 5}, one_each[] = {0, 1, 2};
     const int32_t sides[] = {0, 1, 2, 3};
     const uint8_t apexes[] = {0, 0};
     pl_scene *scene = NULL;
     pl_patches *patches = NULL;
     float factors[16];
     CHECK(pl_scene_create(embree, vertices, 6, triangles, 2, NULL, &scene) == PL_OK);
-    CHECK(pl_patches_create(apexes, rows, 2, columns, 2, &patches) == PL_OK);
+    const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 2, 2, 2};
+    CHECK(pl_patches_create(&layout, &patches) == PL_OK);
     CHECK(pl_form_factors_monte_carlo(scene, patches, sides, 4, 64, 1, factors) == PL_OK);
     for (int k = 0; k < 16; ++k)
         CHECK(isfinite(factors[k]));
