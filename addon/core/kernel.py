@@ -148,7 +148,7 @@ class KernelScene:
     ):  # fmt: skip
         """Add the radiosity that each selected receiver's rays see to io_sums, float32 (N, replicates, 3).
 
-        Returns the rays traced. ``solution`` is a radiosity.PatchSolution, ``guides`` a guides.Guides.
+        Returns the rays traced. ``solution`` is a patch_solution.PatchSolution, ``guides`` a guides.Guides.
         """
         seen, on_texels, lights, where = (x.arrays() for x in (solution, texel_light, emitters, receivers))
         guiding = guides.arrays()

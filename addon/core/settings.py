@@ -33,7 +33,8 @@ class BakeSettings:
     texels : lightmap size as a number of texels, about
     density : texels per metre; when given, it decides the size instead of ``texels`` [1/m]
     keep_uvs : use the objects' existing "Lightmap" UV layers instead of unwrapping
-    patch_size : longest edge of a patch [m]; None = chosen from the scene
+    patch_size : longest edge of all patches [m]; None = chosen from the scene, and with solvers that need form factors
+        the shorter, the more the light changes there
     smooth_angle_deg : faces that meet at less share vertex colours, unless the edge is sharp
     seed : same seed, same bytes
     threads : 0 = all cores

@@ -2,8 +2,9 @@
 
 import pytest
 
+from addon.core.choose import BRIGHT_ROOM, EXCHANGE_TRIANGLES, choose
 from addon.core.emitters import emitters_of
-from addon.core.radiosity import BRIGHT_ROOM, EXCHANGE_TRIANGLES, PATCH_BUDGETS, choose, solve_radiosity
+from addon.core.radiosity import PATCH_BUDGETS, solve_radiosity
 from addon.core.scene import Material
 from addon.core.settings import SOLVERS, BakeSettings
 from tests.scenes import LAMP, cube_room, kernel_of

@@ -1,0 +1,39 @@
+"""What "auto" stands for: the solver for a scene's size and reflectance, and how form factors are estimated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .patches import triangle_areas
+from .scene import Scene
+from .settings import BakeSettings
+
+EXCHANGE_TRIANGLES = 3000  # up to which "auto" takes conjugate gradients, which keep 4 n^2 bytes
+BRIGHT_ROOM = 0.8  # mean reflectance from which conjugate gradients need less time than stochastic Jacobi
+
+
+def choose(settings: BakeSettings, triangle_count: int, reflectance: float = 0.5) -> tuple[str, str, str]:
+    """Solver, method, and a sentence on why, after "auto" has looked at the scene's size and mean reflectance.
+
+    By time to equal error, measured on closed cubes and the Cornell box of 240 to 12000 sides: rows of form factors and
+    conjugate gradients take a third to a tenth of stochastic Jacobi's time at reflectance 0.9, a hundredth at 0.99, up
+    to five times as much at 0.5; they fit up to some 16000 sides. Direct takes longer for the same, progressive
+    refinement leaves twice the error, as it uses each row for one direction only.
+    """
+    method = "monte-carlo" if settings.method == "auto" else settings.method
+    if settings.solver != "auto":
+        return settings.solver, method, f"{settings.solver} and {method} as asked"
+    if method == "hemicube":
+        solver = "conjugate-gradient" if triangle_count <= EXCHANGE_TRIANGLES else "progressive"
+        return solver, method, f"{solver} for {triangle_count} triangles, with form factors by hemicube as asked"
+    if reflectance >= BRIGHT_ROOM and triangle_count <= EXCHANGE_TRIANGLES:
+        reason = f"{triangle_count} triangles of mean reflectance {reflectance:.2f}, where light bounces long"
+        return "conjugate-gradient", method, f"conjugate-gradient for {reason}"
+    return "stochastic", method, f"stochastic for {triangle_count} triangles: it needs no form factors, at any size"
+
+
+def mean_reflectance(scene: Scene) -> float:
+    """Mean over the scene's area of the brightest channel; textures, not read yet, count as grey."""
+    brightest = [max(m.reflectance) * (0.5 if m.reflectance_texture is not None else 1.0) for m in scene.materials]
+    areas = triangle_areas(scene)
+    return float((areas * np.array(brightest)[scene.triangle_materials]).sum() / max(areas.sum(), 1e-300))

@@ -1,0 +1,102 @@
+"""Light on patches before it bounces: the lights' and the world's, at points of every side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .emitters import Emitters
+from .guides import no_guides
+from .kernel import KernelScene
+from .patch_solution import EVEN, PatchSolution
+from .patches import Patches
+from .receivers import patch_receivers
+from .scene import Scene
+from .texel_light import NO_TEXEL_LIGHT
+
+POINTS = 8  # of a patch side: where its direct light is measured
+SMALL = 0.25  # of a full-size patch's area: smaller ones are measured at one point
+PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 1
+PATCH_SKY_RAYS = 4  # of each point
+
+
+@dataclass(frozen=True, slots=True)
+class PatchLight:
+    """Mean irradiance of every patch side by the lights and by the world (2 P, 3), the spread of the former (2 P,)."""
+
+    patches: Patches
+    direct: np.ndarray
+    spread: np.ndarray
+    daylight: np.ndarray
+    rays: int
+
+
+def measure_patches(
+    scene: Scene, kernel: KernelScene, patches: Patches, emitters: Emitters, sky, seed: int, known: PatchLight | None
+) -> PatchLight:
+    """Direct light on patches; on those of cells that are as they were in ``known``, what was measured there."""
+    new, old = np.ones(len(patches), bool), np.zeros(0, bool)
+    if known is not None:
+        is_same = np.bincount(patches.cells) == np.bincount(known.patches.cells)
+        new, old = ~is_same[patches.cells], is_same[known.patches.cells]
+    direct, spread, shadow_rays = _direct_on_patches(scene, kernel, patches, new, emitters, seed)
+    daylight, sky_rays = _sky_on_patches(scene, kernel, patches, new, emitters, sky, seed)
+    if known is not None:
+        for all_of_them, before in ((direct, known.direct), (spread, known.spread), (daylight, known.daylight)):
+            all_of_them[np.repeat(~new, 2)] = before[np.repeat(old, 2)]
+    return PatchLight(patches, direct, spread, daylight, shadow_rays + sky_rays + (known.rays if known else 0))
+
+
+def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, seed):
+    """The lights' mean irradiance on every side, float64 (2 P, 3), its spread over the side (2 P,), and shadow rays.
+
+    A full-size patch is measured at several points; a small one at one, as its neighbours stand in for it when light is
+    gathered. What reflects nothing is left dark.
+    """
+    irradiance, spread = np.zeros((len(patches), 2, 3)), np.zeros((len(patches), 2))
+    rays = 0
+    for chosen, points in _measured(patches, wanted):
+        receivers = patch_receivers(scene, kernel, chosen, points, seed)
+        values, _, traced = kernel.direct(emitters, receivers, min(points, PATCH_SHADOW_SAMPLES), seed)
+        values = values.reshape(-1, 2, points, 3)
+        irradiance[chosen] = values.mean(axis=2, dtype=np.float64)
+        spread[chosen] = np.ptp(values.mean(axis=3), axis=2)
+        rays += traced
+    return irradiance.reshape(-1, 3), spread.ravel(), rays
+
+
+def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, seed):
+    """Mean irradiance of every side from the constant world, float64 (2 P, 3), and the rays it took.
+
+    The sky is gathered with all surfaces black.
+    """
+    irradiance, rays = np.zeros((len(patches), 2, 3)), 0
+    if sky.max() <= 0:
+        return irradiance.reshape(-1, 3), rays
+    black = PatchSolution(
+        radiosity=np.zeros((kernel.side_count, 3), np.float32),
+        direct=np.zeros((kernel.side_count, 3), np.float32),
+        reflectance=np.zeros((len(patches), 3), np.float32),
+        kinds=np.full(kernel.side_count, EVEN, np.uint8),
+        reaches=np.zeros(kernel.side_count, np.float32),
+        sky=sky,
+    )
+    for chosen, points in _measured(patches, wanted):
+        receivers = patch_receivers(scene, kernel, chosen, points, seed)
+        sums = np.zeros((len(receivers), 1, 3), np.float32)
+        everyone = np.arange(len(receivers), dtype=np.uint32)
+        count = PATCH_SKY_RAYS
+        rays += kernel.gather(
+            black, NO_TEXEL_LIGHT, emitters, receivers, no_guides(len(receivers)), everyone, 1, 0, count, seed, sums
+        )
+        irradiance[chosen] = (sums[:, 0] / count).reshape(-1, 2, points, 3).mean(axis=2, dtype=np.float64)
+    return irradiance.reshape(-1, 3), rays
+
+
+def _measured(patches: Patches, wanted):
+    """(patches, points on each) of those wanted that reflect: those of a full-size cell, and of small ones."""
+    wanted = wanted & (patches.reflectance.max(axis=1, initial=0.0) > 0)
+    cell_areas = np.bincount(patches.cells, patches.areas)
+    is_large = cell_areas[patches.cells] > SMALL * patches.size**2
+    return (np.flatnonzero(is_large & wanted), POINTS), (np.flatnonzero(~is_large & wanted), 1)
