@@ -4,6 +4,7 @@
 
 Cycles bakes with all objects joined into one mesh, its best case: as they are it starts anew for each object, which
 ``--as-it-is`` measures too. Only its bake operator is timed; ours is the report's ``seconds.bake``, with unwrapping.
+Where pyoidn is installed, each joined bake is denoised, too (Open Image Denoise, filter RTLightmap), its time added.
 """
 
 from __future__ import annotations
@@ -22,6 +23,11 @@ from patchlight.blender.read_mesh import LIGHTMAP_LAYER
 from patchlight.blender.score_bake import load_reference, score
 from patchlight.blender.write_lightmap import IMAGE_PROPERTY
 
+try:
+    import pyoidn
+except ImportError:
+    pyoidn = None
+
 AIM = 0.01  # of p50, at which times are compared
 BOUNCES = 32
 MARGIN = 4  # texels: bilinear lookup at a chart's border needs them
@@ -31,11 +37,14 @@ def main() -> None:
     """Bake with both, print a table, write it as JSON."""
     args = arguments()
     args.out.mkdir(parents=True, exist_ok=True)
+    if pyoidn is None:
+        print("pyoidn is not installed: no denoised rows")
     reference = load_reference(args.reference)
     rows = [ours(args, error, reference) for error in args.errors]
     baked = rows[0]["file"]
     for is_joined in (True, False) if args.as_it_is else (True,):
-        rows += [cycles(baked, samples, is_joined, reference) for samples in args.samples]
+        for samples in args.samples:
+            rows += cycles(baked, samples, is_joined, reference)
     (args.out / "cycles.json").write_text(json.dumps(rows, indent=1))
     print_table(rows)
 
@@ -64,8 +73,8 @@ def ours(args, error, reference) -> dict:
     return {"way": f"patchlight, error {error:g}", "seconds": seconds, "file": str(file), **result(reference)}
 
 
-def cycles(baked, samples, is_joined, reference) -> dict:
-    """Cycles' bake over the UVs of ours; its pixels are looked up through our file."""
+def cycles(baked, samples, is_joined, reference) -> list[dict]:
+    """Cycles' bake over the UVs of ours, and denoised; its pixels are looked up through our file."""
     open_blend(baked)
     image = next(o[IMAGE_PROPERTY] for o in bpy.data.objects if IMAGE_PROPERTY in o)
     chosen = [o for o in bpy.context.scene.objects if IMAGE_PROPERTY in o]
@@ -79,13 +88,25 @@ def cycles(baked, samples, is_joined, reference) -> dict:
         type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, uv_layer=LIGHTMAP_LAYER, margin=MARGIN, use_clear=True
     )
     seconds = time.perf_counter() - started
-    pixels = np.empty(4 * image.size[0] * image.size[1], np.float32)
-    target.pixels.foreach_get(pixels)
+    pixels = np.empty((image.size[1], image.size[0], 4), np.float32)
+    target.pixels.foreach_get(pixels.ravel())
+    way = f"cycles{' joined' if is_joined else ''}"
+    rows = [{"way": f"{way}, {samples} samples", "seconds": seconds, **looked_up(baked, pixels, reference)}]
+    if is_joined and pyoidn is not None:
+        started = time.perf_counter()
+        pixels[..., :3] = pyoidn.denoise(np.ascontiguousarray(pixels[..., :3]), filter_type="RTLightmap")
+        seconds += time.perf_counter() - started
+        way = f"{way} and denoised, {samples} samples"
+        rows.append({"way": way, "seconds": seconds, **looked_up(baked, pixels, reference)})
+    return rows
+
+
+def looked_up(baked, pixels, reference) -> dict:
+    """The error of pixels (H, W, 4) in the place of our lightmap's."""
     open_blend(baked)
     image = next(o[IMAGE_PROPERTY] for o in bpy.data.objects if IMAGE_PROPERTY in o)
-    image.pixels.foreach_set(pixels)
-    way = f"cycles{' joined' if is_joined else ''}, {samples} samples"
-    return {"way": way, "seconds": seconds, **result(reference)}
+    image.pixels.foreach_set(pixels.ravel())
+    return result(reference)
 
 
 def aim_at(blender_object, image) -> None:
