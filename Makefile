@@ -116,10 +116,12 @@ $(SANITIZED): $(KERNEL_SOURCES) $(DOOR_SOURCES) $(KERNEL_HEADERS) | $(VENV)/.ins
 	    -Inative/include -Inative/src -isystem $$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("include"))') \
 	    $(KERNEL_SOURCES) $(DOOR_SOURCES) -o $@ -lm -ldl -lpthread
 
-# Python itself is not built for it, so the sanitizer's library comes first by hand; Python frees nothing at its end.
+# Python itself is not built for it, so the sanitizer's library comes first by hand, and C++'s next, or what matplotlib
+# throws is not caught; Python frees nothing at its end.
 sanitize: kernel $(SANITIZED)
-	LD_PRELOAD=$$($(CC) -print-file-name=libasan.so) ASAN_OPTIONS=detect_leaks=0:halt_on_error=1:quarantine_size_mb=16 \
-	    UBSAN_OPTIONS=print_stacktrace=1 PYTHONMALLOC=malloc PATCHLIGHT_TEST_KERNEL=$(SANITIZED) \
+	LD_PRELOAD="$$($(CC) -print-file-name=libasan.so) $$($(CC) -print-file-name=libstdc++.so.6)" \
+	    ASAN_OPTIONS=detect_leaks=0:halt_on_error=1:quarantine_size_mb=16 UBSAN_OPTIONS=print_stacktrace=1 \
+	    PYTHONMALLOC=malloc PATCHLIGHT_TEST_KERNEL=$(SANITIZED) \
 	    $(BIN)/python -m pytest --capture=no tests/core tests/physics
 
 # Zig's C compiler makes the kernels of all platforms here; it is needed for nothing else.
