@@ -23,7 +23,13 @@ PATCH_SKY_RAYS = 4  # of each point
 
 @dataclass(frozen=True, slots=True)
 class PatchLight:
-    """Mean irradiance of every patch side by the lights and by the world (2 P, 3), the spread of the former (2 P,)."""
+    """What patches get before light bounces, and the rays that it took to measure.
+
+    Attributes
+    ----------
+    direct, daylight : float64 (2 P, 3) mean irradiance of every side by the lights and by the world [W/m^2]
+    spread : float64 (2 P,) between the brightest and the darkest point of a side, of the lights' [W/m^2]
+    """
 
     patches: Patches
     direct: np.ndarray
@@ -33,14 +39,21 @@ class PatchLight:
 
 
 def measure_patches(
-    scene: Scene, kernel: KernelScene, patches: Patches, emitters: Emitters, sky, seed: int, known: PatchLight | None
+    scene: Scene,
+    kernel: KernelScene,
+    patches: Patches,
+    emitters: Emitters,
+    sky,
+    seed: int,
+    known: PatchLight | None,
+    on_step,
 ) -> PatchLight:
-    """Direct light on patches; on those of cells that are as they were in ``known``, what was measured there."""
+    """Light on patches; on those of cells that are as they were in ``known``, what was measured there."""
     new, old = np.ones(len(patches), bool), np.zeros(0, bool)
     if known is not None:
         is_same = np.bincount(patches.cells) == np.bincount(known.patches.cells)
         new, old = ~is_same[patches.cells], is_same[known.patches.cells]
-    direct, spread, shadow_rays = _direct_on_patches(scene, kernel, patches, new, emitters, seed)
+    direct, spread, shadow_rays = _direct_on_patches(scene, kernel, patches, new, emitters, seed, on_step)
     daylight, sky_rays = _sky_on_patches(scene, kernel, patches, new, emitters, sky, seed)
     if known is not None:
         for all_of_them, before in ((direct, known.direct), (spread, known.spread), (daylight, known.daylight)):
@@ -48,7 +61,7 @@ def measure_patches(
     return PatchLight(patches, direct, spread, daylight, shadow_rays + sky_rays + (known.rays if known else 0))
 
 
-def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, seed):
+def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, seed, on_step):
     """The lights' mean irradiance on every side, float64 (2 P, 3), its spread over the side (2 P,), and shadow rays.
 
     A full-size patch is measured at several points; a small one at one, as its neighbours stand in for it when light is
@@ -56,13 +69,14 @@ def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, seed):
     """
     irradiance, spread = np.zeros((len(patches), 2, 3)), np.zeros((len(patches), 2))
     rays = 0
-    for chosen, points in _measured(patches, wanted):
+    for chosen, points, share in _measured(patches, wanted):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
         values, _, traced = kernel.direct(emitters, receivers, min(points, PATCH_SHADOW_SAMPLES), seed)
         values = values.reshape(-1, 2, points, 3)
         irradiance[chosen] = values.mean(axis=2, dtype=np.float64)
         spread[chosen] = np.ptp(values.mean(axis=3), axis=2)
         rays += traced
+        on_step(share)
     return irradiance.reshape(-1, 3), spread.ravel(), rays
 
 
@@ -82,7 +96,7 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, seed
         reaches=np.zeros(kernel.side_count, np.float32),
         sky=sky,
     )
-    for chosen, points in _measured(patches, wanted):
+    for chosen, points, _ in _measured(patches, wanted):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
         sums = np.zeros((len(receivers), 1, 3), np.float32)
         everyone = np.arange(len(receivers), dtype=np.uint32)
@@ -95,8 +109,9 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, seed
 
 
 def _measured(patches: Patches, wanted):
-    """(patches, points on each) of those wanted that reflect: those of a full-size cell, and of small ones."""
+    """(patches, points on each, share of the work done after them) of those wanted that reflect: those of a full-size
+    cell, and of small ones."""
     wanted = wanted & (patches.reflectance.max(axis=1, initial=0.0) > 0)
     cell_areas = np.bincount(patches.cells, patches.areas)
     is_large = cell_areas[patches.cells] > SMALL * patches.size**2
-    return (np.flatnonzero(is_large & wanted), POINTS), (np.flatnonzero(~is_large & wanted), 1)
+    return (np.flatnonzero(is_large & wanted), POINTS, 0.5), (np.flatnonzero(~is_large & wanted), 1, 1.0)

@@ -62,8 +62,8 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene))
     sky = np.asarray(exitance_from_radiance(scene.world_radiance), np.float32).reshape(1, 3)
 
-    def measure(patches, known=None):
-        return measure_patches(scene, kernel, patches, emitters, sky, settings.seed, known)
+    def measure(patches, on_step, known=None):
+        return measure_patches(scene, kernel, patches, emitters, sky, settings.seed, known, on_step)
 
     def solve(lit, error, on_step):
         emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
@@ -74,10 +74,9 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     if settings.patch_size or solver == "stochastic":
         # where a patch costs rays only, as many of one size are as good in the same time
         size = settings.patch_size or patch_size_for(scene, budget)
-        lit = measure(subdivide(scene, kernel, size, budget, settings.seed))
+        lit = measure(subdivide(scene, kernel, size, budget, settings.seed), lambda done: on_step(0.4 * done))
     else:
-        lit = _decompose(scene, kernel, budget, settings, measure, solve)
-    on_step(0.5)
+        lit = _decompose(scene, kernel, budget, settings, measure, solve, lambda done: on_step(0.4 * done))
     solution = solve(lit, settings.error, lambda done: on_step(0.5 + 0.5 * done))
 
     patches = lit.patches
@@ -95,15 +94,18 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     return Solved(field, emitters, sources, solution, method, choice, {"patches": lit.rays, "solve": solution.rays})
 
 
-def _decompose(scene, kernel, budget, settings, measure, solve) -> PatchLight:
+def _decompose(scene, kernel, budget, settings, measure, solve, on_step) -> PatchLight:
     """Patches that are small where the light changes, and the light on them."""
     coarse = int(budget * COARSE_SHARE)
     grid = grid_of(scene, patch_size_for(scene, coarse), coarse)
     along = np.ones(len(grid), np.int64)
-    lit = measure(cut(scene, kernel, grid, along, settings.seed))
+    rounds = 1 + 2 * len(ROUND_SHARES)  # to measure, and to solve and measure again each time
+    lit = measure(cut(scene, kernel, grid, along, settings.seed), lambda done: on_step(done / rounds))
     count = len(lit.patches)
-    for share in ROUND_SHARES:
-        first = solve(lit, max(settings.error, QUICK_ERROR), lambda done: None)
+    for turn, share in enumerate(ROUND_SHARES):
+        begin = 1 + 2 * turn
+        quick = max(settings.error, QUICK_ERROR)
+        first = solve(lit, quick, lambda done: on_step((begin + done) / rounds))  # noqa: B023
         reflectance = np.maximum(lit.patches.side_reflectance, LEAST_REFLECTANCE)
         irradiance = (first.radiosity / reflectance) @ LUMINANCE
         finer_along = finer(grid, along, lit.patches, irradiance, lit.spread, count + int(share * budget))
@@ -111,7 +113,8 @@ def _decompose(scene, kernel, budget, settings, measure, solve) -> PatchLight:
         if (finer_along == along).all():
             break
         along = finer_along
-        lit = measure(cut(scene, kernel, grid, along, settings.seed), lit)
+        patches = cut(scene, kernel, grid, along, settings.seed)
+        lit = measure(patches, lambda done: on_step((begin + 1 + done) / rounds), lit)  # noqa: B023
     return lit
 
 

@@ -51,17 +51,17 @@ def texels(charts: Charts) -> TexelMap:
     triangles, weights, is_inside = triangles[rows, columns], barycentrics[rows, columns], distances[rows, columns] == 0
     outside = np.flatnonzero(~is_inside)
     centres = np.stack([columns, rows], axis=1)[outside] + 0.5
-    weights[outside] = _further_in(charts.uvs[triangles[outside]].astype(np.float64), centres, weights[outside])
+    weights[outside] = further_in(charts.uvs[triangles[outside]].astype(np.float64), centres, weights[outside])
     return TexelMap(
         rows.astype(np.int32), columns.astype(np.int32), triangles, weights, is_inside, charts.width, charts.height
     )
 
 
-def _further_in(corners, centres, weights):
+def further_in(corners, centres, weights):
     """Barycentrics (K, 3) of the points INSET further into triangles (K, 3, 2) than those nearest to ``centres``."""
     points = np.einsum("nk,nkc->nc", weights, corners)
-    ahead = points - centres
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    ahead = points - centres  # float32 may have rounded it to nothing
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-30)
     inwards = _change_of_weights(corners, ahead)
     # from a corner the way ahead may lead out again: then towards the middle
     length = _way_out(weights, inwards)
@@ -85,6 +85,5 @@ def _change_of_weights(corners, direction):
 
 def _way_out(weights, change):
     """How far (K,) it goes on inside, at least; 0 where it goes nowhere."""
-    with np.errstate(divide="ignore"):
-        steps = np.where(change < -1e-12, weights / np.maximum(-change, 1e-12), np.inf).min(axis=1)
+    steps = np.where(change < -1e-12, weights / np.maximum(-change, 1e-12), np.inf).min(axis=1)
     return np.where(np.isfinite(steps), steps, 0.0)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from addon.core import kernel
 from addon.core.charts import Charts
-from addon.core.texels import INSET, texels
+from addon.core.texels import INSET, further_in, texels
 from tests.reference import texels as reference
 
 WIDTH, HEIGHT = 13, 9
@@ -151,3 +151,11 @@ def test_the_point_for_a_texel_outside_is_a_quarter_texel_in_or_half_way():
     below = np.flatnonzero((found.rows == 1) & (found.columns == 6))
     # 5 of its 7 texels along, the strip is 1/7 texel wide
     assert found.barycentrics[below] @ thin[0, :, 1] == pytest.approx(1.8 + 0.5 / 7, abs=1e-5)
+
+
+def test_a_centre_that_rounds_to_the_edge_gets_a_point_inside_too():
+    corners = np.array([[[0.0, 0.0], [8.0, 0.0], [0.0, 8.0]]])
+    weights = np.array([[0.5, 0.5, 0.0]])
+    found = further_in(corners, np.array([[4.0, 0.0]]), weights)
+    assert np.isfinite(found).all()
+    assert (found > 0).all()
