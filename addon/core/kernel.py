@@ -103,7 +103,14 @@ class KernelScene:
     def _form_factor_rows(self, sides, rows):
         sides = _rows(sides, np.int32)
         out = np.empty((len(sides), self.side_count), np.float32)
-        self.workers.each_range(len(sides), 8, lambda start, stop: rows(sides[start:stop], out[start:stop]))
+
+        def call(start, stop):
+            # millions of small shares are summed: float32 sums would be off by 1e-5
+            sums = np.empty((stop - start, self.side_count), np.float64)
+            rows(sides[start:stop], sums)
+            out[start:stop] = sums
+
+        self.workers.each_range(len(sides), 8, call)
         return out
 
     def openness(self, reaches, rays, seed):
@@ -193,6 +200,13 @@ def smooth(workers, grid, receivers, values, variances, step, stops_on_value):
 
     workers.each_range(height, 16, call)
     return out_values, out_variances
+
+
+def sobol_points(first, count, seed):
+    """Points of a 4-D Owen-scrambled Sobol sequence, from number ``first`` on: float32 (count, 4) in [0, 1)."""
+    out = np.empty((count, 4), np.float32)
+    _kernel.sobol_points(first, seed, out)
+    return out
 
 
 def rasterise_texels(uvs, width, height):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .aimed import aimed_exchanges, pairs_apart
 from .analytic import Surface
 from .bodies import PANEL_ERROR, Body
 from .kernel import KernelScene
@@ -27,9 +28,10 @@ PARTS_LIMIT = 512
 WHOLE_PIECES = 8  # a surface of more pieces is not cut: its pieces are small already
 COARSE_RAYS = 1 << 22  # of a row, where only a solution is wanted: its errors average out
 FIRST_RAYS = 1 << 18  # of all replicates together
-NEAR_BIAS = 10.0  # of 1 / resolution^4, relative: what is left of the pixels' midpoints after extrapolation
-FAR_BIAS = 0.5  # of a pixel's delta form factor: far away, all hemicubes see the target through the same pixels
-FAR_RESOLUTION = 64
+AIMED_WANTED = 4e-7  # bound of the error at which aimed rays stop
+AIMED_RAYS = 1 << 22  # after which they stop, unless with the next ones ...
+AIMED_LIMIT = 1 << 25  # ... up to these they come to what is wanted
+SMOOTH = 1.2  # the error of aimed rays falls with this power of their number where nothing is half hidden
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,27 +44,27 @@ class SampledEstimator:
     workers : threads
     wanted : bound of the error at which it stops
     ray_limit : rays of one row, all replicates together
-    resolution : pixels along a hemicube's top face, near; half of them, too, to extrapolate to none
+    resolution : pixels along a hemicube's top face
     seed : int
     """
 
     name: str
     workers: Workers
-    wanted: float = 3e-4
+    wanted: float = 1e-4
     ray_limit: int = 1 << 25
-    resolution: int = 24
+    resolution: int = 16
     seed: int = 0
 
     @property
     def setting(self) -> str:
         """What is the same for every case, in words."""
         how = (
-            f"hemicubes of {self.resolution}^2 and half as fine near, {FAR_RESOLUTION}^2 far, "
+            f"hemicubes of {self.resolution}^2"
             if self.name == "hemicube"
-            else ""
+            else f"cosine rays, rays aimed at what stands apart until {AIMED_WANTED:g} or 2^{_log2(AIMED_RAYS)}"
         )
-        limit = self.ray_limit.bit_length() - 1
-        return f"{how}{REPLICATES} replicates, rays until the 99 % bound is {self.wanted:g}, at most 2^{limit}"
+        limit = _log2(self.ray_limit)
+        return f"{how}, {REPLICATES} replicates, rays until the 99 % bound is {self.wanted:g}, at most 2^{limit}"
 
     def factor(self, emitter: Surface, target: Surface, blockers=()) -> Estimate:
         """F from emitter to target among blockers; from the smaller of the two, by reciprocity."""
@@ -73,6 +75,9 @@ class SampledEstimator:
         if target.area < emitter.area:
             share = target.area / emitter.area
             emitter, target = target, emitter
+        pairs = pairs_apart(emitter.pieces, target.pieces) if self.name == "monte-carlo" else None
+        if pairs is not None:
+            return self._aimed(emitter, target, blockers, pairs, share)
         row = self._row(emitter, [target, *blockers], self.wanted / share)
         return Estimate(*(np.asarray(getattr(row, key)[0] * share) for key in Estimate.__slots__))
 
@@ -98,6 +103,31 @@ class SampledEstimator:
         found = self.matrix([body.surface() for body in bodies])
         return replace(found, bound=found.bound + PANEL_ERROR * np.abs(found.value))
 
+    def _aimed(self, emitter, target, blockers, pairs, share) -> Estimate:
+        """F from a surface to one that stands apart, times ``share``, refined until its bound is as wanted."""
+        if not pairs:
+            return Estimate(*(np.zeros(()) for _ in Estimate.__slots__))
+        origin = emitter.pieces[0][0]
+        triangles, owners = _triangles([target, emitter, *blockers])
+        kernel = KernelScene(_scene_about(origin, triangles), self.workers)
+        pairs = [(a - origin, b - origin) for a, b in pairs]
+        seeds, scale = [self.seed + k for k in range(REPLICATES)], share / emitter.area
+        rays = max(1, FIRST_RAYS // (REPLICATES * len(pairs)))
+        rays, done, sums = 1 << (rays - 1).bit_length(), 0, 0.0
+        while True:
+            # a whole power of two is even all over: the first rays and as many again
+            sums = sums + rays * scale * aimed_exchanges(kernel, owners == 0, pairs, rays, done, seeds)
+            done += rays
+            rays = done
+            traced = REPLICATES * len(pairs) * done
+            seen, unhidden = np.moveaxis(sums / done, 1, 0)
+            # what no ray has found to be hidden is a share of what is not
+            found = estimate(seen, traced / max(unhidden.mean(), 1e-300))
+            hoped = found.bound * (traced / AIMED_LIMIT) ** SMOOTH
+            limit = AIMED_LIMIT if hoped <= AIMED_WANTED * share else AIMED_RAYS
+            if found.bound <= AIMED_WANTED * share or 2 * traced > limit:
+                return found
+
     def _row(self, emitter, others, wanted, own=None) -> Estimate:
         """F from a surface to each of the others, float64 (N,), refined until its bound is as wanted.
 
@@ -108,47 +138,35 @@ class SampledEstimator:
         scenes = [_PartScene(part, len(parts) == 1, emitter, others, own, self.workers) for part in parts]
         weights = np.array([_area(part) for part in parts]) / emitter.area
         bias = min(1.0, sum(w * min(1.0, part_push(p, others)) for w, part in zip(weights, parts) for p in part[:1]))
-        # many pieces, or parts, even out what each hemicube's pixels do
-        is_near = len(parts) > 1 or len(emitter.pieces) > WHOLE_PIECES or is_coarse
         spent, turn = FIRST_RAYS // REPLICATES, 0
         while True:
             replicates, rays = 0.0, 0
             for k, (weight, scene) in enumerate(zip(weights, scenes)):
                 # parts must not share a sequence: their errors would add up
                 first, share = REPLICATES * (turn * len(parts) + k), max(1, spent // (len(parts) * len(scene.sides)))
-                found, traced = self._replicates(scene, share, first, is_near)
+                found, traced = self._replicates(scene, share, first)
                 replicates, rays = replicates + weight * found, rays + traced
             if estimate(replicates, rays).bound.max() <= wanted or 4 * rays > self.ray_limit:
-                return self._with_bias(estimate(replicates, rays, bias), is_near)
+                return estimate(replicates, rays, bias)
             spent, turn = 4 * spent, turn + 1
 
     def coarser(self) -> SampledEstimator:
         """The same for the form factors of a solution."""
         return replace(self, ray_limit=COARSE_RAYS)
 
-    def _replicates(self, scene, rays, first, is_near):
+    def _replicates(self, scene, rays, first):
         """Factors of a part (REPLICATES, N), and the rays traced for them, ``rays`` or more from each of its sides."""
         if self.name == "monte-carlo":
-            chosen = [(1.0, MonteCarloFormFactors(scene.kernel, 1 << (rays - 1).bit_length(), self.seed))]
+            chosen = MonteCarloFormFactors(scene.kernel, 1 << (rays - 1).bit_length(), self.seed)
         else:
             positions = max(1, round(rays / (3 * self.resolution**2)))
-            fine = HemicubeFormFactors(scene.kernel, FAR_RESOLUTION, positions, self.seed)
-            chosen = [(1.0, fine)]
-            if is_near:
-                # midpoints of pixels are off by the square of their size, evened out over positions (Richardson)
-                near = [replace(fine, resolution=size) for size in (self.resolution, self.resolution // 2)]
-                chosen = list(zip((4 / 3, -1 / 3), near))
-        found = sum(w * replicated(one, scene.sides, scene.reduce, first) for w, one in chosen)
-        return found, REPLICATES * len(scene.sides) * sum(one.rays_per_row for _, one in chosen)
+            chosen = HemicubeFormFactors(scene.kernel, self.resolution, positions, self.seed)
+        found = replicated(chosen, scene.sides, scene.reduce, first)
+        return found, REPLICATES * len(scene.sides) * chosen.rays_per_row
 
-    def _with_bias(self, found: Estimate, is_near) -> Estimate:
-        if self.name == "monte-carlo":
-            return found
-        if is_near:
-            return replace(found, bound=found.bound + NEAR_BIAS / self.resolution**4 * np.abs(found.value))
-        # the middle pixels of the top face: the largest there are
-        pixel = (2 / FAR_RESOLUTION) ** 2 / np.pi
-        return replace(found, bound=found.bound + FAR_BIAS * pixel + np.abs(found.value) / FAR_RESOLUTION**2)
+
+def _log2(count):
+    return count.bit_length() - 1
 
 
 def _area(part):

@@ -103,6 +103,13 @@ size_t pl_patches_count(const pl_patches *patches);
 bool pl_patches_fit(const pl_patches *patches, const pl_scene *scene);
 
 /*
+ * Points first .. first + count - 1 of a 4-D Owen-scrambled Sobol sequence in [0, 1)^4 (Burley 2020).
+ *
+ *   out_points  4 * count floats
+ */
+void pl_sobol_points(uint32_t first, size_t count, uint32_t seed, float *out_points);
+
+/*
  * Points spread evenly over patches, randomised quasi-Monte Carlo.
  *
  *   selected          count patches
@@ -120,17 +127,18 @@ pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, si
  * Monte Carlo: cosine rays, stratified in position and direction together by a 4-D Owen-scrambled Sobol
  * sequence (Burley 2020). Hemicube (Cohen & Greenberg 1985): delta form factors of a half cube's pixels,
  * normalised to sum to 1 [their eqs. 12-13], from `positions` points spread over the patch, each
- * hemicube turned about the normal by an angle of its own.
+ * hemicube turned about the normal by an angle of its own, its rays through a point of the pixels of its own: where
+ * all went through the middles, a long edge would fall on the same side of them at every position (aliasing).
  *
  *   sides      count of them: 2 * patch + side
  *   rays       per side, at least 1
  *   resolution pixels along the top face, even, at least 2: 3 * resolution^2 rays per position
- *   out_rows   count * 2 * patch_count floats
+ *   out_rows   count * 2 * patch_count doubles: millions of small shares must sum to 1
  */
 pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *patches, const int32_t *sides,
-                                      size_t count, uint32_t rays, uint32_t seed, float *out_rows);
+                                      size_t count, uint32_t rays, uint32_t seed, double *out_rows);
 pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t count,
-                                   uint32_t resolution, uint32_t positions, uint32_t seed, float *out_rows);
+                                   uint32_t resolution, uint32_t positions, uint32_t seed, double *out_rows);
 
 /*
  * The share of cosine rays from each side that meet nothing within its reach: how much room it has.

@@ -162,6 +162,24 @@ static PyObject *patch_points(PyObject *self, PyObject *args) {
     return door_result(status);
 }
 
+static PyObject *sobol_points(PyObject *self, PyObject *args) {
+    PyObject *object;
+    unsigned first, seed;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "IIO", &first, &seed, &object))
+        return NULL;
+    door_array arrays[] = {{"out_points", 'f', 4, -1, true, {0}}};
+    if (!door_arrays(&object, arrays, 1))
+        return NULL;
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_sobol_points(first, door_rows(&arrays[0]), seed, arrays[0].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, 1);
+    Py_RETURN_NONE;
+}
+
 static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
     PyObject *capsules[2], *objects[2];
     unsigned rays, seed;
@@ -172,7 +190,7 @@ static PyObject *form_factors_monte_carlo(PyObject *self, PyObject *args) {
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = door_patches(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
-    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
+    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'd', 1, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
         return NULL;
     if (!door_has_numbers(&arrays[1], door_rows(&arrays[0]) * (size_t)sides)) {
@@ -200,7 +218,7 @@ static PyObject *form_factors_hemicube(PyObject *self, PyObject *args) {
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = door_patches(scene, capsules[1]);
     const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
-    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'f', 1, -1, true, {0}}};
+    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'd', 1, -1, true, {0}}};
     if (!patches || !door_arrays(objects, arrays, 2))
         return NULL;
     if (!door_has_numbers(&arrays[1], door_rows(&arrays[0]) * (size_t)sides)) {
@@ -342,6 +360,7 @@ static PyMethodDef methods[] = {
      "create_patches(apexes, first_rows, first_cells, first_patches) -> patches"},
     {"patch_points", patch_points, METH_VARARGS,
      "patch_points(layout, patches, samples, seed, out_triangles, out_barycentrics)"},
+    {"sobol_points", sobol_points, METH_VARARGS, "sobol_points(first, seed, out_points)"},
     {"form_factors_monte_carlo", form_factors_monte_carlo, METH_VARARGS,
      "form_factors_monte_carlo(scene, patches, sides, rays, seed, out_rows)"},
     {"form_factors_hemicube", form_factors_hemicube, METH_VARARGS,

@@ -9,8 +9,8 @@
 #include <string.h>
 
 /* Add a ray's share to the entry of what it hits. */
-static void deposit(const pl_scene *scene, const pl_patches *patches, vec3 origin, vec3 direction, float share,
-                    float *row) {
+static void deposit(const pl_scene *scene, const pl_patches *patches, vec3 origin, vec3 direction, double share,
+                    double *row) {
     const pl_hit hit = closest_hit(scene, origin, direction, 0);
     if (hit.triangle >= 0)
         row[hit_side(patches, &hit)] += share;
@@ -24,11 +24,11 @@ static bool sides_are_in_range(const pl_patches *patches, const int32_t *sides, 
 }
 
 pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *patches, const int32_t *sides,
-                                      size_t count, uint32_t rays, uint32_t seed, float *out_rows) {
+                                      size_t count, uint32_t rays, uint32_t seed, double *out_rows) {
     const size_t side_count = 2 * patches->patch_count;
     if (rays == 0 || !sides_are_in_range(patches, sides, count))
         return PL_ERR_ARGUMENT;
-    memset(out_rows, 0, sizeof(float) * side_count * count);
+    memset(out_rows, 0, sizeof(double) * side_count * count);
     for (size_t i = 0; i < count; ++i) {
         const size_t side = (size_t)sides[i];
         const pl_side_frame frame = side_frame(scene, patches, side);
@@ -38,7 +38,7 @@ pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *p
                 side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
             const vec3 direction =
                 cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), frame.u, frame.v, frame.normal);
-            deposit(scene, patches, origin, direction, 1 / (float)rays, out_rows + i * side_count);
+            deposit(scene, patches, origin, direction, 1 / (double)rays, out_rows + i * side_count);
         }
     }
     return PL_OK;
@@ -56,61 +56,71 @@ static float delta_side(float y, float z) {
     return z / (PL_PI * square * square);
 }
 
-/* Pixel `k` of a half cube of width 2 and height 1: its direction in (u, v, n), returns its delta factor. */
-static float hemicube_pixel(uint32_t k, uint32_t resolution, vec3 *out_direction) {
+/* Where in its pixel each ray of a hemicube goes through, from (0, 0) to (1, 1): the same in all pixels. */
+typedef struct pixel_point {
+    float x, y;
+} pixel_point;
+
+/* Pixel `k` of a half cube of width 2 and height 1: its direction in (u, v, n), returns its delta factor, not yet
+ * normalised. */
+static float hemicube_pixel(uint32_t k, uint32_t resolution, pixel_point at, vec3 *out_direction) {
     const uint32_t top = resolution * resolution;
     const float step = 2 / (float)resolution;
     if (k < top) {
-        const float x = ((float)(k % resolution) + 0.5f) * step - 1;
-        const float y = ((float)(k / resolution) + 0.5f) * step - 1;
+        const float x = ((float)(k % resolution) + at.x) * step - 1;
+        const float y = ((float)(k / resolution) + at.y) * step - 1;
         *out_direction = (vec3){x, y, 1};
         return delta_top(x, y);
     }
-    const uint32_t face = (k - top) / (top / 2), at = (k - top) % (top / 2);
-    const float y = ((float)(at % resolution) + 0.5f) * step - 1;
-    const float z = ((float)(at / resolution) + 0.5f) * step;
+    const uint32_t face = (k - top) / (top / 2), pixel = (k - top) % (top / 2);
+    const float y = ((float)(pixel % resolution) + at.x) * step - 1;
+    const float z = ((float)(pixel / resolution) + at.y) * step;
     const vec3 around[4] = {{1, y, z}, {-1, y, z}, {y, 1, z}, {y, -1, z}};
     *out_direction = around[face];
     return delta_side(y, z);
 }
 
-/* Sum of all delta factors before normalising: 1 but for the pixels' finite size. */
-static float hemicube_sum(uint32_t resolution) {
+/* Sum of all delta factors before normalising. */
+static double hemicube_sum(uint32_t resolution, pixel_point at) {
     double sum = 0;
     vec3 direction;
     for (uint32_t k = 0; k < 3 * resolution * resolution; ++k)
-        sum += (double)hemicube_pixel(k, resolution, &direction);
-    return (float)sum;
+        sum += (double)hemicube_pixel(k, resolution, at, &direction);
+    return sum;
 }
 
 static void hemicube_at(const pl_scene *scene, const pl_patches *patches, vec3 origin, const pl_side_frame *frame,
-                        float turn, uint32_t resolution, float share, float *row) {
+                        float turn, pixel_point at, uint32_t resolution, double share, double *row) {
     const float cosine = cosf(turn), sine = sinf(turn);
     const vec3 u = vec3_mul_add(frame->u, cosine, vec3_scale(frame->v, sine));
     const vec3 v = vec3_mul_add(frame->v, cosine, vec3_scale(frame->u, -sine));
+    const double normalised = share / hemicube_sum(resolution, at);
     for (uint32_t k = 0; k < 3 * resolution * resolution; ++k) {
         vec3 local;
-        const float delta = hemicube_pixel(k, resolution, &local);
+        const float delta = hemicube_pixel(k, resolution, at, &local);
         const vec3 across = vec3_mul_add(u, local.x, vec3_scale(v, local.y));
-        deposit(scene, patches, origin, vec3_mul_add(frame->normal, local.z, across), delta * share, row);
+        deposit(scene, patches, origin, vec3_mul_add(frame->normal, local.z, across), (double)delta * normalised, row);
     }
 }
 
 pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t count,
-                                   uint32_t resolution, uint32_t positions, uint32_t seed, float *out_rows) {
+                                   uint32_t resolution, uint32_t positions, uint32_t seed, double *out_rows) {
     const size_t side_count = 2 * patches->patch_count;
     if (resolution < 2 || resolution % 2 || positions == 0 || !sides_are_in_range(patches, sides, count))
         return PL_ERR_ARGUMENT;
-    memset(out_rows, 0, sizeof(float) * side_count * count);
-    const float share = 1 / (hemicube_sum(resolution) * (float)positions);
+    memset(out_rows, 0, sizeof(double) * side_count * count);
     for (size_t i = 0; i < count; ++i) {
         const size_t side = (size_t)sides[i];
         const pl_side_frame frame = side_frame(scene, patches, side);
         const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
+        /* a fifth coordinate, of a sequence of its own */
+        const uint32_t fifth_seed = hash_pair(side_seed, 4);
         for (uint32_t k = 0; k < positions; ++k) {
             const vec3 origin =
                 side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
-            hemicube_at(scene, patches, origin, &frame, 2 * PL_PI * sobol(k, 2, side_seed), resolution, share,
+            const float turn = 2 * PL_PI * sobol(k, 2, side_seed);
+            const pixel_point at = {sobol(k, 3, side_seed), sobol(k, 0, fifth_seed)};
+            hemicube_at(scene, patches, origin, &frame, turn, at, resolution, 1 / (double)positions,
                         out_rows + i * side_count);
         }
     }

@@ -1,6 +1,8 @@
 /* Sobol's sequence. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "sampling.h"
 
+#include "patchlight.h"
+
 /*
  * Direction numbers of dimensions 1..3 with their bits reversed, so that scrambling needs no reversal
  * first: bit k of the index switches column k. Dimension 0 is the radical inverse: index bit k sets bit
@@ -30,4 +32,10 @@ uint32_t sobol_reversed(uint32_t index, int dimension) {
         if (index & 1u)
             point ^= directions[dimension - 1][k];
     return point;
+}
+
+void pl_sobol_points(uint32_t first, size_t count, uint32_t seed, float *out_points) {
+    for (size_t i = 0; i < count; ++i)
+        for (int dimension = 0; dimension < DIMENSIONS; ++dimension)
+            out_points[DIMENSIONS * i + (size_t)dimension] = sobol(first + (uint32_t)i, dimension, seed);
 }

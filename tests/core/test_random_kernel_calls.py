@@ -96,7 +96,7 @@ def test_form_factors_of_any_sides(data):
         return
     scene, patches, count = kernel
     sides = arrays(data.draw, data.draw(counts), np.int32, st.integers(0, max(2 * count - 1, 0)) | numbers)
-    rows, seed = np.full((len(sides), 2 * count), np.nan, np.float32), data.draw(seeds)
+    rows, seed = np.full((len(sides), 2 * count), np.nan), data.draw(seeds)
     rays, positions = data.draw(st.sampled_from((0, 1, 64))), data.draw(st.sampled_from((0, 1, 3)))
     is_sound = ((sides >= 0) & (sides < 2 * count)).all()
     for call, spent in (

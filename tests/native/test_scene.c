@@ -73,7 +73,7 @@ static void rows_are_finite_and_closed(const pl_scene *scene) {
     const uint8_t apexes[] = {0, 0, 0, 0};
     const int32_t one_each[] = {0, 1, 2, 3, 4}, sides[] = {0, 2, 4, 6};
     pl_patches *patches = NULL;
-    float factors[4 * SIDES];
+    double factors[4 * SIDES];
     const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 4, 4, 4};
     CHECK(pl_patches_create(&layout, &patches) == PL_OK);
     for (int estimator = 0; estimator < 2; ++estimator) {
@@ -84,7 +84,7 @@ static void rows_are_finite_and_closed(const pl_scene *scene) {
             double sum = 0;
             for (int k = 0; k < SIDES; ++k) {
                 CHECK(isfinite(factors[SIDES * i + k]) && factors[SIDES * i + k] >= 0);
-                sum += (double)factors[SIDES * i + k];
+                sum += factors[SIDES * i + k];
             }
             CHECK(fabs(sum - 1) < 1e-5); /* float sums of 768 shares */
         }
@@ -105,7 +105,7 @@ static void form_factors_of_a_triangle_without_area_are_finite(const pl_embree *
     const uint8_t apexes[] = {0, 0};
     pl_scene *scene = NULL;
     pl_patches *patches = NULL;
-    float factors[16];
+    double factors[16];
     CHECK(pl_scene_create(embree, vertices, 6, triangles, 2, NULL, &scene) == PL_OK);
     const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 2, 2, 2};
     CHECK(pl_patches_create(&layout, &patches) == PL_OK);

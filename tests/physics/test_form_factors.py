@@ -44,9 +44,10 @@ def by_twin(scene, seed, method=None, **spent):
 
 
 ROUTES = {
-    # the pixels of a hemicube sample by midpoints: an error of the order of (1 / resolution)^2 is left
+    # the twin's pixels sample by midpoints, which leaves an error of the order of (1 / resolution)^2; the kernel's at
+    # a point of their own for each hemicube, which leaves none
     "kernel, Monte Carlo": (partial(by_kernel, by_monte_carlo), 0),
-    "kernel, hemicube": (partial(by_kernel, by_hemicube), 1 / 16**2),
+    "kernel, hemicube": (partial(by_kernel, by_hemicube), 0),
     "twin, cosine rays": (partial(by_twin, method=twins.by_cosine_rays, rays=4000), 0),
     "twin, hemicube": (partial(by_twin, method=twins.by_hemicubes, resolution=16, positions=64), 1 / 16**2),
 }
@@ -69,8 +70,8 @@ def test_a_closed_box_takes_all_the_light(estimator):
     with kernel_of(scene) as kernel:
         patches = subdivide(scene, kernel, 0.4, 1000, 0)
         rows = estimator(kernel, 0).rows(np.arange(0, 2 * len(patches), 2))
-    # float32 sums of up to 6144 shares
-    assert rows.sum(axis=1) == pytest.approx(np.ones(len(rows)), abs=2e-5)
+    # each entry is rounded to float32, their sums are not: a furnace at 0.9999 needs this
+    assert rows.sum(axis=1, dtype=np.float64) == pytest.approx(np.ones(len(rows)), abs=2e-7)
     # a box seen from inside shows no backs
     assert (rows[:, 1::2] == 0).all()
 

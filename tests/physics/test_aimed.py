@@ -1,0 +1,53 @@
+"""Aimed rays: exact values where surfaces stand apart, none where they touch, and what is hidden."""
+
+import numpy as np
+import pytest
+
+from addon.core.aimed import pairs_apart
+from addon.core.analytic import surface
+from addon.core.kernel import sobol_points
+from addon.core.sampled import SampledEstimator
+from addon.core.workers import Workers
+
+FLOOR = surface("floor", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+CEILING = surface("ceiling", [(0, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0, 1)])
+C_11 = 0.19982489569838738  # Howell: opposed unit squares, distance 1
+
+
+@pytest.fixture
+def estimator():
+    with Workers(2) as workers:
+        yield SampledEstimator("monte-carlo", workers)
+
+
+def test_what_stands_apart_is_right_to_a_millionth(estimator):
+    found = estimator.factor(FLOOR, CEILING)
+    # 4e-7 is the bound at which rays stop
+    assert found.bound < 4e-7
+    assert found.value == pytest.approx(C_11, abs=1e-6)
+
+
+def test_a_blocker_hides_all_or_half(estimator):
+    whole = surface("whole", [(-1, -1, 0.5), (2, -1, 0.5), (2, 2, 0.5), (-1, 2, 0.5)])
+    assert estimator.factor(FLOOR, CEILING, [whole]).value == 0
+    # in the middle plane x = 1/2 hides every ray that crosses it; by symmetry a half is F between equal halves
+    wall = surface("wall", [(0.5, 0, 0), (0.5, 1, 0), (0.5, 1, 1), (0.5, 0, 1)])
+    left = [surface("a", [(0, 0, 0), (0.5, 0, 0), (0.5, 1, 0), (0, 1, 0)]),
+            surface("b", [(0, 0, 1), (0, 1, 1), (0.5, 1, 1), (0.5, 0, 1)])]  # fmt: skip
+    assert estimator.factor(FLOOR, CEILING, [wall]).value == pytest.approx(estimator.factor(*left).value, abs=2e-5)
+
+
+def test_surfaces_that_touch_have_no_pairs():
+    wall = surface("wall", [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)])
+    assert pairs_apart(FLOOR.pieces, wall.pieces) is None
+
+
+def test_surfaces_that_face_away_have_an_empty_list():
+    below = surface("below", [(0, 0, -1), (1, 0, -1), (1, 1, -1), (0, 1, -1)])
+    assert pairs_apart(FLOOR.pieces, below.pieces) == []
+
+
+def test_sobol_points_are_even_in_each_coordinate():
+    points = sobol_points(0, 64, 3)
+    # a (0, m, 1) net in each: one point in each 64th
+    assert (np.sort(np.floor(64 * points), axis=0) == np.arange(64)[:, None]).all()
