@@ -108,7 +108,7 @@ def test_sampled_methods_state_an_error_that_covers(method):
 
 def test_nothing_hit_is_never_certain():
     far = PLATES | {"B": [[x, y, 1e5] for x, y, _ in PLATES["B"]]}
-    result = run("monte-carlo", value=1 / (np.pi * 1e10), geometry={"surfaces": far})
+    result = run("hemicube", value=1 / (np.pi * 1e10), geometry={"surfaces": far})
     assert result.value == 0
     assert result.stated_error > 0
     assert result.covered
