@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from .kernel import KernelScene, sobol_points
-from .polygon import above, bisect, fault_of, polygon_area, unit_normal
+from .polygon import above, bisect, extent, fault_of, polygon_area, unit_normal
 from .quadrature import fan, triangle_areas
 
 APART = 1.2  # distance of two parts' centres, in the sum of their radii, from which rays may be aimed at one
@@ -96,7 +96,7 @@ def _are_visible(kernel, is_target, origins, normal, along):
 
 def _points_on(corners, places):
     """Points on a convex polygon (K, 3), evenly by area, of places (N, 2) in the unit square."""
-    if len(corners) == 4 and np.allclose(corners[0] + corners[2], corners[1] + corners[3], rtol=0, atol=1e-12):
+    if len(corners) == 4 and np.abs(corners[0] - corners[1] + corners[2] - corners[3]).max() <= 1e-12 * extent(corners):
         return corners[0] + places[:, :1] * (corners[1] - corners[0]) + places[:, 1:] * (corners[3] - corners[0])
     triangles = fan(corners)
     areas = triangle_areas(triangles)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .aimed import aimed_exchanges, pairs_apart
+from .aimed import PUSH, aimed_exchanges, pairs_apart
 from .analytic import Surface
 from .bodies import PANEL_ERROR, Body
 from .kernel import KernelScene
@@ -20,7 +20,6 @@ from .scene import Material, Scene, SceneObject
 from .transport import REPLICATES, Estimate, HemicubeFormFactors, MonteCarloFormFactors, estimate, replicated
 from .workers import Workers
 
-PUSH = 2.0**-20  # of a triangle's largest coordinate: how far off it the kernel's rays start (native/src/scene.h)
 PUSH_ALLOWED = 2e-5  # share of the emitter whose rays may start beyond what they should hit
 CLOSE_PARTS = 16  # into which a surface is cut, about, where something is near
 CLOSE = 5.0  # distance in sizes below which one hemicube cannot stand for a part

@@ -86,7 +86,7 @@ static void rows_are_finite_and_closed(const pl_scene *scene) {
                 CHECK(isfinite(factors[SIDES * i + k]) && factors[SIDES * i + k] >= 0);
                 sum += factors[SIDES * i + k];
             }
-            CHECK(fabs(sum - 1) < 1e-5); /* float sums of 768 shares */
+            CHECK(fabs(sum - 1) < 1e-9); /* double sums of 768 shares */
         }
     }
     const int32_t outside[] = {SIDES};
