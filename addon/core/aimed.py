@@ -18,7 +18,7 @@ PAIRS_LIMIT = 256  # of parts
 DEEPEST = 12  # how often a pair is cut in two: surfaces that touch never come to an end
 RAYS_AT_ONCE = 1 << 16
 PUSH = 2.0**-20  # of the largest coordinate: how far off their surface rays start (as in native/src/scene.h)
-END = 1e-4  # of a ray: what is hit so near to its end is what it was aimed at
+END = 2.0**-19  # of a ray: what is hit so near to its end is what it was aimed at
 
 
 def pairs_apart(emitter_pieces, target_pieces):

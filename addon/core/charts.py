@@ -67,6 +67,7 @@ class TargetSurface:
     objects : tuple of (name, slice into the rows)
     corners : float64 (N, 3, 3) [m]
     area_vectors : float64 (N, 3) normals as long as the triangle's area [m^2]
+    areas : float64 (N,) [m^2]
     polygons : int64 (N,) 0.. without gaps, of all objects
     loops : int64 (N, 3) face corners, of all objects: one loop has one UV
     """
@@ -75,12 +76,9 @@ class TargetSurface:
     objects: tuple[tuple[str, slice], ...]
     corners: np.ndarray
     area_vectors: np.ndarray
+    areas: np.ndarray
     polygons: np.ndarray
     loops: np.ndarray
-
-    @property
-    def areas(self) -> np.ndarray:
-        return np.linalg.norm(self.area_vectors, axis=1)
 
 
 def target_surface(scene: Scene) -> TargetSurface:
@@ -104,7 +102,8 @@ def target_surface(scene: Scene) -> TargetSurface:
     if not area_vectors.any():
         raise SceneError("nothing to bake: no face of the target objects has an area")
     polygons = np.unique(np.concatenate(polygons), return_inverse=True)[1]
-    return TargetSurface(triangles, tuple(objects), corners, area_vectors, polygons, np.concatenate(loops))
+    areas = np.linalg.norm(area_vectors, axis=1)
+    return TargetSurface(triangles, tuple(objects), corners, area_vectors, areas, polygons, np.concatenate(loops))
 
 
 def weld(points):

@@ -24,6 +24,7 @@ static void recentre(pl_scene *scene, const double *vertices) {
         scene->centre[k] = 0.5 * (low[k] + high[k]);
     for (size_t i = 0; i < 3 * scene->vertex_count; ++i)
         scene->vertices[i] = (float)(vertices[i] - scene->centre[i % 3]);
+    scene->reach = (float)(0.5 * fmax(fmax(high[0] - low[0], high[1] - low[1]), high[2] - low[2]));
 }
 
 /* Whether a triangle's corners lie on a line to within their rounding: such a one must never be hit. */
@@ -181,8 +182,18 @@ static pl_hit layer_hit(const pl_scene *scene, const pl_layer *layer, vec3 origi
                     .is_back = facing > 0};
 }
 
-pl_hit closest_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near) {
+pl_hit opaque_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near) {
     return layer_hit(scene, &scene->opaque, origin, direction, near, INFINITY);
+}
+
+/* Of a hit on an edge, to within rounding. */
+static bool is_at_edge(const pl_hit *hit) {
+    return fminf(fminf(hit->u, hit->v), 1 - hit->u - hit->v) < 9.5367431640625e-7f;
+}
+
+pl_hit closest_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near) {
+    const pl_hit hit = opaque_hit(scene, origin, direction, near);
+    return hit.triangle >= 0 && is_at_edge(&hit) ? hit_at_edge(scene, origin, direction, near, hit) : hit;
 }
 
 bool is_occluded(const pl_scene *scene, vec3 origin, vec3 direction, float far) {

@@ -53,6 +53,22 @@ def test_no_texel_and_no_vertex_of_the_dark_room_is_lit(target):
     assert (stored == 0).all()
 
 
+def test_no_ray_at_the_edge_of_the_wall_gets_into_the_dark_room():
+    """Aimed at the wall's four edges to within float32's last bits, where floor and ceiling of both rooms end too."""
+    rng = np.random.default_rng(0)
+    count = 1 << 19
+    along = rng.random((count, 1))
+    ends = np.array([(1, 0, 0), (1, 1, 0), (1, 1, 1), (1, 0, 1)], float)[rng.integers(0, 4, count)]
+    following = np.column_stack([ends[:, 0], 1 - ends[:, 2], ends[:, 1]])  # a quarter turn on
+    points = ends + along * (following - ends) + rng.normal(0, 3e-8, (count, 3))
+    origins = rng.uniform((0, 0, 0), (1, 1, 1), (count, 3))
+    with kernel_of(two_rooms(targets=())) as kernel:
+        triangles, _ = kernel.closest_hits(origins, points - origins)
+    assert (triangles >= 0).all()
+    is_dark = (triangles >= 10) & (triangles < 20)
+    assert not is_dark.any(), f"{is_dark.sum()} rays of {count} see the dark room"
+
+
 def test_no_direct_light_passes_under_a_wall_that_stands_on_one_floor():
     """One floor polygon through both rooms: of the lamp nothing gets to the dark part, to the bit."""
     panel = AreaLight("panel", (-1.0, 0, 2.9), (0, 0.5, 0), (0.5, 0, 0), (30.0, 30.0, 30.0))
