@@ -93,8 +93,8 @@ def _sampled(case, workers, make, setting, seed):
         weights = patches.areas[owners == 0] / patches.areas[owners == 0].sum()
         # replicates of one run are neighbours in seed; runs are far apart
         one = make(kernel, setting, seed + 1000 * turn)
-        rays = REPLICATES * len(sides) * one.rays_per_row
-        found = estimate(replicated(one, sides, lambda rows: weights @ rows[:, target].sum(axis=1)), rays)
+        rays, equal_rays = (REPLICATES * len(sides) * per_row for per_row in (one.rays_per_row, one.equal_rays_per_row))
+        found = estimate(replicated(one, sides, lambda rows: weights @ rows[:, target].sum(axis=1)), equal_rays)
         return Outcome(abs(float(found.value) / case.exact - 1), rays, float(found.bound) / case.exact)
 
     return run

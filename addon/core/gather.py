@@ -40,7 +40,7 @@ DIRECT_PASSES = 2  # each with four times the shadow rays of the one before, for
 DIRECT_SHARE = 0.5  # of the error that direct light may have
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
 PILOT = 4  # of a probe's rays, one in so many tells whether it needs more
-MORE_RAYS, MOST_PROBE_RAYS = 16, 2048  # times as many, but not more, for probes more uncertain than the error aimed at
+MORE_RAYS, MOST_PROBE_RAYS = 16, 1024  # times as many, but not more, for probes more uncertain than the error aimed at
 FURTHER = 2.0  # seen points look so many times further before they take a texel's or a patch's light for what is there
 POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
 

@@ -28,9 +28,8 @@ LIBRARY_PATTERNS = {
 }
 
 
-@functools.cache
-def embree():
-    """Embree of the installed embreex wheel, opened once in a process; found by pattern, its name carries a hash."""
+def embree_path() -> pathlib.Path:
+    """Embree's library of the installed embreex wheel, found by pattern: its name carries a hash."""
     spec = importlib.util.find_spec("embreex")
     if spec is None or not spec.origin:
         raise ImportError("the package embreex is missing, which brings Embree: pip install embreex==4.4.0.post1")
@@ -38,8 +37,14 @@ def embree():
     for pattern in LIBRARY_PATTERNS.get(sys.platform, ()):
         head, _, name = pattern.rpartition("/")
         for path in sorted((folder / head).glob(name)):
-            return _kernel.open_embree(str(path.resolve()))
+            return path.resolve()
     raise ImportError(f"no Embree 4 library stands beside {folder}: pip install embreex==4.4.0.post1")
+
+
+@functools.cache
+def embree():
+    """Embree, opened once in a process."""
+    return _kernel.open_embree(str(embree_path()))
 
 
 class KernelScene:

@@ -18,7 +18,8 @@ from .receivers import CornerMeans, Receivers, surface_receivers
 from .scene import Scene
 from .texels import TexelMap
 
-PROBES = 2048
+LEAST_PROBES, MOST_PROBES = 512, 2048
+PROBE_OF = 64  # receivers that one stands for, between these: measuring is not to take longer than baking
 MOST_OF_OBJECT = 0.25  # of the seen points that lie on one object: a ground plane must not take all
 
 
@@ -62,14 +63,20 @@ def rms_of(squares) -> float:
     return float(np.sqrt(max(squares.mean(), 0.0))) if len(squares) else 0.0
 
 
+def probe_count(receivers: int) -> int:
+    """How many points are measured in a bake of so many receivers."""
+    return min(max(receivers // PROBE_OF, LEAST_PROBES), MOST_PROBES)
+
+
 def chosen_receivers(count: int):
     """Receivers that are measured, evenly through ``count`` of them: uint32 (K,)."""
-    return np.unique(np.linspace(0, count - 1, min(PROBES, count)).round().astype(np.uint32))
+    return np.unique(np.linspace(0, count - 1, min(probe_count(count), count)).round().astype(np.uint32))
 
 
 def seen_through_lightmap(scene: Scene, charts: Charts, texel_map: TexelMap, seed: int) -> SeenPoints:
     """Points that are looked up in a lightmap bilinearly, as a viewer does."""
-    triangles, barycentrics = _random_points(scene, np.isfinite(charts.uvs).all(axis=(1, 2)), seed)
+    is_laid_out = np.isfinite(charts.uvs).all(axis=(1, 2))
+    triangles, barycentrics = _random_points(scene, is_laid_out, probe_count(len(texel_map)), seed)
     grid = np.full((texel_map.height, texel_map.width), -1, np.int32)
     grid[texel_map.rows, texel_map.columns] = np.arange(len(texel_map))
     places = np.einsum("nk,nkc->nc", barycentrics, charts.uvs[triangles].astype(np.float64)) - 0.5
@@ -94,7 +101,7 @@ def seen_through_corners(scene: Scene, means: CornerMeans, seed: int) -> SeenPoi
     """Points between whose triangle's corners colours are interpolated."""
     is_coloured = np.zeros(len(scene.triangles), bool)
     is_coloured[means.triangles] = True
-    triangles, barycentrics = _random_points(scene, is_coloured, seed)
+    triangles, barycentrics = _random_points(scene, is_coloured, probe_count(3 * len(means.triangles)), seed)
     rows = np.searchsorted(means.triangles, triangles)
     receivers = surface_receivers(scene, triangles, barycentrics)
     return SeenPoints(
@@ -102,7 +109,7 @@ def seen_through_corners(scene: Scene, means: CornerMeans, seed: int) -> SeenPoi
     )
 
 
-def _random_points(scene, is_usable, seed):
+def _random_points(scene, is_usable, count, seed):
     """Points by area on the usable triangles of the targets: triangles int32 (M,), barycentrics float64 (M, 3)."""
     rng = np.random.default_rng([seed, 0x5EE4])
     corners = scene.corners
@@ -115,6 +122,6 @@ def _random_points(scene, is_usable, seed):
             areas[obj.span] *= MOST_OF_OBJECT / share
     if not areas.any():
         return np.zeros(0, np.int32), np.zeros((0, 3))
-    triangles = rng.choice(len(areas), PROBES, p=areas / areas.sum()).astype(np.int32)
-    root, across = np.sqrt(rng.random(PROBES)), rng.random(PROBES)
+    triangles = rng.choice(len(areas), count, p=areas / areas.sum()).astype(np.int32)
+    root, across = np.sqrt(rng.random(count)), rng.random(count)
     return triangles, np.stack([1 - root, root * (1 - across), root * across], axis=1)

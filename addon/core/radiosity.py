@@ -25,6 +25,8 @@ from .transport import form_factors
 
 # patches, about, that each solver is given; triangles are never joined, so there may be more
 PATCH_BUDGETS = {"direct": 1200, "conjugate-gradient": 5000, "progressive": 3000, "stochastic": 60000}
+DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic: where errors larger than this are asked for, or few texels,
+PATCH_OF = 4  # each of which sees the light of its like where it can, and patches only near by
 COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
 ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
 QUICK_ERROR = 0.2  # of the solutions that say where it does
@@ -70,7 +72,7 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
         precision = replace(settings, error=error)
         return solve_patches(kernel, lit.patches, emitted, solver, method, precision, on_step)
 
-    budget = PATCH_BUDGETS[solver]
+    budget = patch_budget(solver, settings)
     if settings.patch_size or solver == "stochastic":
         # where a patch costs rays only, as many of one size are as good in the same time
         size = settings.patch_size or patch_size_for(scene, budget)
@@ -92,6 +94,17 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     )
     sources = with_bright_sides(scene, kernel.centre, patches, emitters, solution.radiosity, bright)
     return Solved(field, emitters, sources, solution, method, choice, {"patches": lit.rays, "solve": solution.rays})
+
+
+def patch_budget(solver: str, settings: BakeSettings) -> int:
+    """How many patches, about, a solver is given."""
+    budget = PATCH_BUDGETS[solver]
+    if solver != "stochastic" or settings.patch_size:
+        return budget
+    wanted = budget * min(1.0, DRAFT_ERROR / settings.error)
+    if settings.target == "lightmap" and not settings.density:
+        wanted = min(wanted, settings.texels / PATCH_OF)
+    return int(max(wanted, DRAFT_BUDGET))
 
 
 def _decompose(scene, kernel, budget, settings, measure, solve, on_step) -> PatchLight:
@@ -122,7 +135,7 @@ def solve_patches(kernel, patches, emitted, solver, method, settings, on_step) -
     """Radiosity of all sides from what they emit, float64 (2 P, 3) [W/m^2], by a named solver and method."""
     areas, reflectance = patches.side_areas, np.minimum(patches.side_reflectance, MOST_REFLECTANCE)
     if solver == "stochastic":
-        rays = int(min(max(8 * len(emitted), 1 << 20) * (0.05 / settings.error), 1 << 25))
+        rays = int(min(max(8 * len(emitted), 1 << 18) * (0.05 / settings.error), 1 << 25))
         return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, settings.seed, on_step)
     estimator = form_factors(kernel, method, settings.error, settings.seed)
     if solver == "progressive":

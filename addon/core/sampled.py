@@ -139,14 +139,14 @@ class SampledEstimator:
         bias = min(1.0, sum(w * min(1.0, part_push(p, others)) for w, part in zip(weights, parts) for p in part[:1]))
         spent, turn = FIRST_RAYS // REPLICATES, 0
         while True:
-            replicates, rays = 0.0, 0
+            replicates, rays, equal_rays = 0.0, 0, 0
             for k, (weight, scene) in enumerate(zip(weights, scenes)):
                 # parts must not share a sequence: their errors would add up
                 first, share = REPLICATES * (turn * len(parts) + k), max(1, spent // (len(parts) * len(scene.sides)))
                 found, traced = self._replicates(scene, share, first)
-                replicates, rays = replicates + weight * found, rays + traced
-            if estimate(replicates, rays).bound.max() <= wanted or 4 * rays > self.ray_limit:
-                return estimate(replicates, rays, bias)
+                replicates, rays, equal_rays = replicates + weight * found, rays + traced[0], equal_rays + traced[1]
+            if estimate(replicates, equal_rays).bound.max() <= wanted or 4 * rays > self.ray_limit:
+                return estimate(replicates, equal_rays, bias)
             spent, turn = 4 * spent, turn + 1
 
     def coarser(self) -> SampledEstimator:
@@ -154,14 +154,16 @@ class SampledEstimator:
         return replace(self, ray_limit=COARSE_RAYS)
 
     def _replicates(self, scene, rays, first):
-        """Factors of a part (REPLICATES, N), and the rays traced for them, ``rays`` or more from each of its sides."""
+        """Factors of a part (REPLICATES, N), with ``rays`` or more from each of its sides; the rays traced, and what
+        these are worth in rays of equal shares."""
         if self.name == "monte-carlo":
             chosen = MonteCarloFormFactors(scene.kernel, 1 << (rays - 1).bit_length(), self.seed)
         else:
             positions = max(1, round(rays / (3 * self.resolution**2)))
             chosen = HemicubeFormFactors(scene.kernel, self.resolution, positions, self.seed)
         found = replicated(chosen, scene.sides, scene.reduce, first)
-        return found, REPLICATES * len(scene.sides) * chosen.rays_per_row
+        rows = REPLICATES * len(scene.sides)
+        return found, (rows * chosen.rays_per_row, rows * chosen.equal_rays_per_row)
 
 
 def _log2(count):

@@ -30,6 +30,11 @@ class MonteCarloFormFactors:
         """Rays that one row costs."""
         return self.rays
 
+    @property
+    def equal_rays_per_row(self) -> int:
+        """As many rays as stand for equal shares of the row and tell as much where nothing is hit."""
+        return self.rays
+
 
 @dataclass(frozen=True, slots=True)
 class HemicubeFormFactors:
@@ -48,6 +53,14 @@ class HemicubeFormFactors:
     def rays_per_row(self) -> int:
         """Rays that one row costs."""
         return 3 * self.resolution**2 * self.positions
+
+    @property
+    def equal_rays_per_row(self) -> int:
+        """As many rays as stand for equal shares of the row and tell as much where nothing is hit.
+
+        A pixel in the middle of the top stands for 4 / (pi resolution^2) [Cohen & Greenberg 1985, eq. 12].
+        """
+        return max(1, int(np.pi / 4 * self.resolution**2)) * self.positions
 
 
 # ---- how wrong they may be ----
@@ -75,7 +88,8 @@ class Estimate:
 
 
 def estimate(replicates, rays: int, bias: float = 0.0) -> Estimate:
-    """From replicates (REPLICATES, ...) that took ``rays`` rays in all; ``bias`` is a known share of the value."""
+    """From replicates (REPLICATES, ...) that took ``rays`` rays of equal shares in all; ``bias``: a known share of the
+    value."""
     value = np.mean(replicates, axis=0)
     standard_error = np.std(replicates, axis=0, ddof=1) / np.sqrt(len(replicates))
     bound = np.maximum(STUDENT_99 * standard_error, RULE_OF_THREE / rays) + bias * np.abs(value)

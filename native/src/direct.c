@@ -43,9 +43,9 @@ static size_t choose_light(const float *importances, size_t count, float total, 
  * that falls below the horizon, or on a triangle's dark side, is drawn again: else a light of which no sample could
  * shine would be lost.
  */
-static bool sample_above_horizon(const pl_lights *lights, vec3 point, vec3 normal, size_t light, uint32_t seed,
-                                 uint32_t k, pl_light_sample *out_sample) {
-    const uint32_t tries = light_has_closed_form(lights, light) ? 32 : 1;
+static bool sample_above_horizon(const pl_lights *lights, vec3 point, vec3 normal, size_t light, bool is_exact,
+                                 uint32_t seed, uint32_t k, pl_light_sample *out_sample) {
+    const uint32_t tries = is_exact ? 32 : 1;
     for (uint32_t try = 0; try < tries; ++try) {
         const uint32_t try_seed = try ? hash_pair(seed, 0x40000000u + try) : seed;
         if (light_sample(lights, light, point, normal, sobol(k, 0, try_seed), sobol(k, 1, try_seed), out_sample))
@@ -62,11 +62,15 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
     if (total <= 0)
         return false;
     const size_t chosen = choose_light(importances, lights->count, total, sobol(0, 2, seed));
-    if (!sample_above_horizon(lights, origin, normal, chosen, seed, 0, &sample))
+    float exact[3];
+    const bool is_exact = light_exact(lights, chosen, origin, normal, exact);
+    if ((is_exact && luminance(exact) <= 0) ||
+        !sample_above_horizon(lights, origin, normal, chosen, is_exact, seed, 0, &sample))
         return false;
     /* the sample's own estimate has no bound close to a lamp: where there is a closed form the ray only says whether
        the lamp is seen */
-    (void)light_exact(lights, chosen, origin, normal, sample.irradiance);
+    for (int c = 0; is_exact && c < 3; ++c)
+        sample.irradiance[c] = exact[c];
     if (!is_occluded(scene, origin, sample.direction, sample.far)) {
         transmit(scene, origin, sample.direction, sample.far, sample.irradiance);
         for (int c = 0; c < 3; ++c)
@@ -103,12 +107,12 @@ typedef struct light_sums {
     uint32_t visible, taken;
 } light_sums;
 
-static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed, uint32_t first,
-                         uint32_t end, light_sums *io_sums) {
+static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, bool is_exact, uint32_t seed,
+                         uint32_t first, uint32_t end, light_sums *io_sums) {
     for (uint32_t k = first; k < end; ++k) {
         pl_light_sample sample;
         ++io_sums->taken;
-        if (!sample_above_horizon(job->lights, frame->origin, frame->shading, light, seed, k, &sample))
+        if (!sample_above_horizon(job->lights, frame->origin, frame->shading, light, is_exact, seed, k, &sample))
             continue;
         for (int c = 0; c < 3; ++c)
             io_sums->all[c] += sample.irradiance[c];
@@ -120,16 +124,14 @@ static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t
     }
 }
 
-/* The light that arrives, from one replicate's sums. */
-static void estimate(const direct_job *job, const pl_receiver_frame *frame, size_t light, const light_sums *sums,
-                     float out_rgb[3]) {
-    float exact[3];
-    const bool is_exact = light_exact(job->lights, light, frame->origin, frame->shading, exact);
+/* The light that arrives, from one replicate's sums; `exact` is what would arrive if all of the light were seen, or
+ * NULL where that is not known. */
+static void estimate(const light_sums *sums, const float *exact, float out_rgb[3]) {
     for (int c = 0; c < 3; ++c) {
         out_rgb[c] = 0;
-        if (is_exact && sums->all[c] > 0)
+        if (exact && sums->all[c] > 0)
             out_rgb[c] = exact[c] * (sums->seen[c] / sums->all[c]);
-        else if (!is_exact && sums->taken)
+        else if (!exact && sums->taken)
             out_rgb[c] = sums->seen[c] / (float)sums->taken;
     }
 }
@@ -146,20 +148,24 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
                     io_totals[r][c] += sample.irradiance[c];
         return;
     }
+    float exact[3];
+    const bool is_exact = light_exact(job->lights, light, frame->origin, frame->shading, exact);
+    if (is_exact && luminance(exact) <= 0)
+        return;
     const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
     const uint32_t few = most < 8 ? most : most * 3 / 8 < 8 ? 8 : most * 3 / 8;
     light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}, {{0}, {0}, 0, 0}};
     uint32_t visible = 0, taken = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {
-        sample_range(job, frame, light, hash_pair(seed, r), 0, few, &sums[r]);
+        sample_range(job, frame, light, is_exact, hash_pair(seed, r), 0, few, &sums[r]);
         visible += sums[r].visible;
         taken += sums[r].taken;
     }
     for (uint32_t r = 0; r < REPLICATES; ++r) {
         float rgb[3];
         if (visible > 0 && visible < taken)
-            sample_range(job, frame, light, hash_pair(seed, r), few, most, &sums[r]);
-        estimate(job, frame, light, &sums[r], rgb);
+            sample_range(job, frame, light, is_exact, hash_pair(seed, r), few, most, &sums[r]);
+        estimate(&sums[r], is_exact ? exact : NULL, rgb);
         for (int c = 0; c < 3; ++c)
             io_totals[r][c] += rgb[c];
     }

@@ -18,15 +18,6 @@ bool light_is_sharp(const pl_lights *lights, size_t light) {
     return (lights->kinds[light] == PL_LIGHT_POINT || lights->kinds[light] == PL_LIGHT_SUN) && p[6] <= 0;
 }
 
-bool light_has_closed_form(const pl_lights *lights, size_t light) {
-    const float *p = parameters_of(lights, light);
-    if (lights->kinds[light] == PL_LIGHT_AREA) {
-        const area_light lamp = area_of(p);
-        return area_is_exact(&lamp);
-    }
-    return lights->kinds[light] == PL_LIGHT_MESH && mesh_of(p).count <= EXACT_TRIANGLES;
-}
-
 static bool exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]) {
     const float *p = parameters_of(lights, light);
     if (lights->kinds[light] == PL_LIGHT_AREA) {

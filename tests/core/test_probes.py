@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from addon.core.probes import MOST_OF_OBJECT, Measured, rms_of, seen_through_corners, seen_through_lightmap
+from addon.core.probes import (
+    LEAST_PROBES,
+    MOST_OF_OBJECT,
+    Measured,
+    rms_of,
+    seen_through_corners,
+    seen_through_lightmap,
+)
 from addon.core.receivers import vertex_receivers
 from addon.core.relative import scale_of
 from addon.core.settings import BakeSettings
@@ -54,7 +61,7 @@ def test_a_ground_plane_does_not_take_all_points():
     on_ground = np.mean(points.positions[:, 2] == 0)
     # the ground's weight is a quarter of the whole area, so all but 1 / 1250 of what is chosen from
     assert MOST_OF_OBJECT < on_ground
-    assert len(points) == 2048
+    assert len(points) == LEAST_PROBES
 
 
 def test_the_error_of_probes_takes_out_what_they_do_not_know():

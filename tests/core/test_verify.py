@@ -114,6 +114,12 @@ def test_nothing_hit_is_never_certain():
     assert result.covered
 
 
+def test_what_lies_between_the_rays_of_hemicubes_is_covered():
+    """A target smaller than a pixel that none of 340 hemicubes hits: each pixel there stands for 1 / 201 of a row."""
+    far = PLATES | {"B": [[x, y, 100.0] for x, y, _ in PLATES["B"]]}
+    assert run("hemicube", value=1 / (np.pi * 1e4), geometry={"surfaces": far}).covered
+
+
 def test_a_report_is_plain_numbers():
     results = [run(), run(value=1.0)]
     content = json.loads(json.dumps(report(results, "analytic", "x")))
