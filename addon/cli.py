@@ -122,6 +122,7 @@ def _add_bake(commands):
     add("--objects", nargs="+", metavar="NAME", help="bake only these; the others still block and reflect light")
     add("--subdivide", type=float, metavar="METRES", help="cut larger faces first (target vertex)")
     add("--patch-size", type=float, metavar="METRES", help="longest edge of a patch (default: by the scene)")
+    add("--no-denoise", action="store_true", help="keep Blender's denoiser out of lightmaps")
     add("--seed", type=int, default=DEFAULTS.seed, help="the same seed gives the same bytes (default: %(default)s)")
     add("--threads", type=int, default=DEFAULTS.threads, metavar="N", help="0 = all cores (default)")
     add("--report", type=Path, metavar="OUT.json", help="write seconds, rays, error and warnings as JSON")
@@ -140,6 +141,7 @@ def settings_from(args: argparse.Namespace) -> BakeSettings:
         density=args.density,
         keep_uvs=args.keep_uvs,
         patch_size=args.patch_size,
+        denoise=not args.no_denoise,
         seed=args.seed,
         threads=args.threads,
     )
@@ -157,6 +159,7 @@ def run_bake(args: argparse.Namespace) -> None:
     seconds: dict[str, float] = {}
     with with_blender() as bpy, ProgressBar() as progress:
         from .blender import bake_scene, files
+        from .blender.denoiser_library import denoiser_library
         from .core.bake import bake
 
         _require_writable(output, args)
@@ -166,7 +169,7 @@ def run_bake(args: argparse.Namespace) -> None:
         progress("read", 0.0)
         with _timed(seconds, "read"):
             prepared = bake_scene.prepare(bpy.context.scene, settings, args.objects, args.subdivide)
-        result = bake(prepared.scene, settings, progress)
+        result = bake(prepared.scene, settings, progress, denoiser_library())
         # from here on Ctrl-C waits until the files are whole: the bake has succeeded and its result is kept
         with _on_ctrl_c(signal.SIG_IGN):
             with _timed(seconds, "write"):

@@ -14,14 +14,14 @@ MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
     *("ranges", "settings", "scene", "sound_faces", "textures", "emitters", "relative", "z_order"),
-    *("report", "workers", "kernel", "patches"),
+    *("report", "workers", "kernel", "patches", "parted"),
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
     *("transport", "aimed", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
     *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides"),
     *("patch_solution", "patch_light", "decomposition", "choose", "radiosity"),
-    *("charts", "cut", "flatten", "packing", "unwrap", "texels", "smoothing", "probes"),
-    *("allocation", "gather", "lightmap", "bake"),
+    *("charts", "cut", "flatten", "packing", "unwrap", "texels", "gaps", "smoothing", "probes"),
+    *("denoiser", "denoising", "allocation", "gather", "lightmap", "bake"),
     *("peak_memory", "bench_row", "bench_cube", "bench_scenes", "bench_peers", "bench_factors", "bench_light", "bench"),
     "bench_plot",
 )

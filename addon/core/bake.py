@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
+from . import denoiser
 from .emitters import emitters_of
 from .gather import Irradiance, gather_irradiance
 from .kernel import KernelScene
@@ -43,8 +45,12 @@ class BakeResult:
     report: Report
 
 
-def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = None) -> BakeResult:
+def bake(
+    scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = None, denoiser_library: Path | None = None
+) -> BakeResult:
     """Light a scene: from triangles to E / pi on every texel or vertex of its target objects.
+
+    ``denoiser_library`` is Open Image Denoise, None where there is none.
 
     Raises SceneError or SettingsError for what cannot be baked, BakeCancelled when ``on_progress`` returns False.
     """
@@ -52,7 +58,10 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
     _require_targets(sound)
     scene = sound.scene
     progress = Progress(on_progress, STAGE_SHARES)
-    with Workers(settings.thread_count) as workers:
+    with (
+        Workers(settings.thread_count) as workers,
+        denoiser.opened(denoiser_library, settings) as (denoise, no_denoiser),
+    ):
         if settings.target == "lightmap":
             progress.begin("unwrap")
             charts = unwrap(scene, settings, progress.step)
@@ -74,7 +83,7 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
 
         progress.begin("gather")
         irradiance = gather_irradiance(
-            kernel, solved, receivers, grid, seen, settings.error, settings.seed,
+            kernel, solved, receivers, grid, seen, settings.error, settings.seed, denoise,
             lambda: np.inf if settings.time_limit is None else settings.time_limit - progress.elapsed, progress.step,
         )  # fmt: skip
 
@@ -89,7 +98,8 @@ def bake(scene: Scene, settings: BakeSettings, on_progress: OnProgress | None = 
             corner_colours[corner_means.triangles] = colours
             corner_colours = sound.spread(corner_colours)
         progress.end()
-    report = _report(scene, settings, progress, solved, irradiance, lightmap)
+        used = _denoiser_used(denoise, no_denoiser, irradiance)
+    report = replace(_report(scene, settings, progress, solved, irradiance, lightmap), denoiser=used)
     return BakeResult(lightmap, corner_colours, report)
 
 
@@ -100,6 +110,13 @@ def _require_targets(sound: SoundFaces) -> None:
         reasons = "; ".join(sound.scene.warnings[len(sound.whole.warnings) :][:1])
         raise SceneError(f"nothing to bake: no face of the target objects can be: {reasons}")
     raise SceneError("nothing to bake: the scene has no target object with faces")
+
+
+def _denoiser_used(denoise, reason, irradiance) -> str:
+    """For the report: what was used, or "none" and why."""
+    if irradiance.is_denoised:
+        return denoise.name
+    return f"none: {reason or denoise.failure or 'no better than smoothing'}"
 
 
 def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap) -> Report:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .allocation import measured_errors, next_pass, rays_due
+from .denoising import denoised
 from .emitters import LUMINANCE
 from .guides import Guides, learn_guides, no_guides
 from .kernel import KernelScene
@@ -16,7 +18,7 @@ from .radiosity import Solved
 from .receivers import Receivers
 from .relative import scale_of
 from .smoothing import TexelGrid, blurred, smoothed
-from .texel_light import NO_TEXEL_LIGHT, TexelLight
+from .texel_light import NO_TEXEL_LIGHT, TexelLight, split_where_blocked
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
 LOOK_RAYS = 1  # of a replicate, for the first look at the texels' light, which the first pass then sees
@@ -32,6 +34,7 @@ FREE_RAYS = 1 << 26
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
 AIM = 0.9  # of the target: what receivers are due is an estimate
+DENOISE = 1.15  # times the target: nearer to it the denoiser is asked, and when nothing else helps
 SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
 MOST_EXTRA = 2  # passes after that, each with four times the rays: speckles are gone by then
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
@@ -56,6 +59,7 @@ class Irradiance:
     seen_error : the same at random points of the surfaces, looked up in the result as a viewer does
     target_reached : whether sampling met its target
     stopped : what ended it, "" where nothing was left to do
+    is_denoised : whether the denoiser's estimate was the better one
     rays : {"direct": shadow rays, "gather": rays, "probe": rays that measure the error}
     """
 
@@ -64,6 +68,7 @@ class Irradiance:
     seen_error: float
     target_reached: bool
     stopped: str
+    is_denoised: bool
     rays: dict[str, int]
 
 
@@ -86,6 +91,7 @@ class _Job:
     receivers: Receivers
     guides: Guides
     texel_light: TexelLight = NO_TEXEL_LIGHT
+    denoise: Callable | None = None
 
     def part(self, chosen) -> _Job:
         """The same for some of the receivers."""
@@ -124,6 +130,7 @@ def gather_irradiance(
     seen: SeenPoints,
     error: float,
     seed: int,
+    denoise: Callable | None,
     seconds_left,
     on_step,
 ) -> Irradiance:
@@ -135,12 +142,14 @@ def gather_irradiance(
     grid : the texels that the receivers are, over which gathered light is smoothed; None = no smoothing
     seen : random points of the surfaces, at which the result is looked up
     error : target of the relative error of every receiver [1]
+    denoise : a denoiser.Denoiser, or None
     seconds_left : () -> float, until the time limit [s]; the first pass is always finished
     on_step : (0..1) -> None
     """
     if not len(receivers):
-        return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", {"direct": 0, "gather": 0, "probe": 0})
-    job = _Job(kernel, solved, receivers, no_guides(len(receivers)))
+        nothing = {"direct": 0, "gather": 0, "probe": 0}
+        return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
+    job = _Job(kernel, solved, receivers, no_guides(len(receivers)), denoise=denoise if grid else None)
     direct, shadow_rays = _direct_until(job, error, seed, lambda done: on_step(0.25 * done))
     looks = 0
     if grid is not None:
@@ -156,7 +165,8 @@ def gather_irradiance(
         "gather": looks + learning + gathered.rays,
         "probe": gathered.probe_rays + at_points.rays,
     }
-    return Irradiance(gathered.values, gathered.rms, seen_error, gathered.rms <= error, gathered.stopped, traced)
+    is_met = gathered.rms <= error
+    return Irradiance(gathered.values, gathered.rms, seen_error, is_met, gathered.stopped, gathered.is_denoised, traced)
 
 
 def _with_first_look(job: _Job, grid: TexelGrid, direct, seed, on_step):
@@ -165,7 +175,8 @@ def _with_first_look(job: _Job, grid: TexelGrid, direct, seed, on_step):
     rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, LOOK_RAYS, seed, sums, on_step)
     reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
     no_light = np.zeros((len(sums), 3), np.float32)
-    job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, grid.receivers, no_light, reach))
+    cells = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
+    job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, cells, no_light, reach))
     return _seeing(job, grid, direct, sums / LOOK_RAYS), rays
 
 
@@ -229,8 +240,28 @@ class _Gathered:
     values: np.ndarray
     rms: float
     stopped: str
+    is_denoised: bool
     rays: int
     probe_rays: int
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """Irradiance (N, 3), its squared relative errors at the probes, and whether the denoiser was believed."""
+
+    values: np.ndarray
+    squares: np.ndarray
+    is_denoised: bool
+
+
+def _denoised(job: _Job, grid, found: _Found, means, direct, chosen, probes) -> _Found:
+    """What the denoiser makes of it, where there is one and the probes find it better."""
+    if job.denoise is None:
+        return found
+    gathered = means.mean(axis=1, dtype=np.float32)
+    values = denoised(job.denoise, grid, found.values, direct, gathered, chosen, probes)
+    squares = probes.squares_of(values[chosen], scale_of(values)[chosen])
+    return _Found(values, squares, True) if rms_of(squares) < rms_of(found.squares) else found
 
 
 def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -> _Gathered:
@@ -249,11 +280,17 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
         if grid:
             job = _seeing(job, grid, direct, means)
         probes = probes or _measure(job.part(chosen), error, seed + 1)
-        values, relative, squares = _best_estimate(job, grid, means, direct, chosen, probes)
+        smooth, relative, squares = _best_estimate(job, grid, means, direct, chosen, probes)
+        found = _Found(smooth, squares, False)
+        is_asked = rms_of(squares) <= DENOISE * error
+        if is_asked:
+            found = _denoised(job, grid, found, means, direct, chosen, probes)
+        squares = found.squares
         rms = rms_of(squares)
 
         def ended(why=""):
-            return _Gathered(job, values, rms, why, rays, probes.rays)  # noqa: B023
+            last = found if is_asked else _denoised(job, grid, found, means, direct, chosen, probes)  # noqa: B023
+            return _Gathered(job, last.values, rms_of(last.squares), why, last.is_denoised, rays, probes.rays)  # noqa: B023
 
         idle = idle + 1 if rms > max(error, WORTH_IT * before) else 0
         if idle == MOST_IDLE:

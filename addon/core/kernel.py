@@ -72,8 +72,15 @@ class KernelScene:
 
     def occluded(self, points_from, points_to):
         """Whether an opaque triangle lies between points (N, 3): bool (N,)."""
+        points_from, points_to = _rows(points_from, np.float64), _rows(points_to, np.float64)
+        if len(points_from) != len(points_to):
+            raise ValueError(f"points_to has {len(points_to)} rows, points_from {len(points_from)}")
         out = np.empty(len(points_from), np.uint8)
-        _kernel.occluded(self._scene, _rows(points_from, np.float64), _rows(points_to, np.float64), out)
+
+        def call(start, stop):
+            _kernel.occluded(self._scene, points_from[start:stop], points_to[start:stop], out[start:stop])
+
+        self.workers.each_range(len(out), 1 << 16, call)
         return out.astype(bool)
 
     def set_patches(self, apexes, first_rows, first_cells, first_patches) -> None:

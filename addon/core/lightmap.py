@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .charts import Charts
+from .gaps import fill_gaps
 from .scene import exitance_from_radiance, radiance_from_exitance
 from .texels import TexelMap
-
-RINGS = 2  # around the charts that are filled by the mean of their neighbours; the rest coarse to fine
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +32,7 @@ def assemble(irradiance: np.ndarray, texel_map: TexelMap, charts: Charts) -> Lig
     pixels[texel_map.rows, texel_map.columns] = radiance_from_exitance(irradiance)
     is_set = np.zeros(pixels.shape[:2], bool)
     is_set[texel_map.rows, texel_map.columns] = True
-    for _ in range(RINGS):
-        is_set = _dilate(pixels, is_set)
-    _fill(pixels, is_set)
+    fill_gaps(pixels, is_set)
     return Lightmap(pixels, charts.uvs / np.float32([charts.width, charts.height]))
 
 
@@ -54,46 +51,3 @@ def bilinear(pixels, uvs):
     left, down = low.T
     below = (1 - x) * pixels[down, left] + x * pixels[down, right]
     return (1 - y) * below + y * ((1 - x) * pixels[up, left] + x * pixels[up, right])
-
-
-def _dilate(pixels, is_set):
-    """Set empty texels beside set ones to the mean of these, of eight neighbours; what is set now."""
-    height, width = is_set.shape
-    padded = np.pad(is_set, 1)
-    near = np.zeros_like(is_set)
-    for row, column in NEIGHBOURS:
-        near |= padded[row : row + height, column : column + width]
-    rows, columns = np.nonzero(near & ~is_set)
-    sums, counts = np.zeros((len(rows), 3)), np.zeros(len(rows))
-    for row, column in NEIGHBOURS:
-        counted = padded[rows + row, columns + column]
-        beside = np.clip(rows + row - 1, 0, height - 1), np.clip(columns + column - 1, 0, width - 1)
-        sums += np.where(counted[:, None], pixels[beside], 0.0)
-        counts += counted
-    pixels[rows, columns] = sums / counts[:, None]
-    is_set = is_set.copy()
-    is_set[rows, columns] = True
-    return is_set
-
-
-NEIGHBOURS = tuple((row, column) for row in range(3) for column in range(3) if (row, column) != (1, 1))
-
-
-def _fill(pixels, is_set):
-    """Push-pull: the mean of what is set at half the size fills what is not, from coarse to fine; in place."""
-    if is_set.all() or not is_set.any():
-        return
-    height, width = is_set.shape
-    edge = ((0, height % 2), (0, width % 2))
-    weights = np.pad(is_set, edge).astype(np.float32)
-    sums = _halved(np.pad(pixels, (*edge, (0, 0))) * weights[..., None])
-    counts = _halved(weights)
-    coarse = sums / np.maximum(counts, 1)[..., None]
-    _fill(coarse, counts > 0)
-    rows, columns = np.nonzero(~is_set)
-    pixels[rows, columns] = coarse[rows // 2, columns // 2]
-
-
-def _halved(image):
-    """Sums over 2 x 2 texels."""
-    return image[::2, ::2] + image[1::2, ::2] + image[::2, 1::2] + image[1::2, 1::2]

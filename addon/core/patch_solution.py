@@ -8,6 +8,7 @@ import numpy as np
 
 from .emitters import LUMINANCE, Emitters, with_sources
 from .kernel import KernelScene
+from .parted import is_parted
 from .patches import Patches, patch_triangles
 from .scene import Scene, radiance_from_exitance
 
@@ -73,10 +74,12 @@ def side_kinds(patches, radiosity, spread, is_confined):
     return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
 
 
-def reaches_of(kernel: KernelScene, patches: Patches, seed: int):
-    """From how near a side's mean is not to be taken, float32 (2 P,) [m]: never, in a gap narrower than its patch."""
+def reaches_of(scene: Scene, kernel: KernelScene, patches: Patches, seed: int):
+    """From how near a side's mean is not to be taken, float32 (2 P,) [m]: never, in a gap narrower than its patch, or
+    where something parts it in two."""
     reaches = np.repeat(REACH * np.sqrt(patches.areas), 2).astype(np.float32)
     reaches[kernel.openness(reaches, OPENNESS_RAYS, seed) < CONFINED] = np.inf
+    reaches[is_parted(scene, kernel, patches, seed)] = np.inf
     return reaches
 
 

@@ -13,9 +13,10 @@ from .dense import require_direct_size, solve_direct
 from .emitters import LUMINANCE, Emitters
 from .exchange import exchange_of
 from .kernel import KernelScene
+from .parted import finer_where_parted
 from .patch_light import PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
-from .patches import cut, grid_of, patch_size_for, subdivide
+from .patches import cut, grid_of, patch_size_for
 from .progressive import solve_progressive
 from .scene import Scene, exitance_from_radiance
 from .settings import BakeSettings
@@ -76,13 +77,18 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     if settings.patch_size or solver == "stochastic":
         # where a patch costs rays only, as many of one size are as good in the same time
         size = settings.patch_size or patch_size_for(scene, budget)
-        lit = measure(subdivide(scene, kernel, size, budget, settings.seed), lambda done: on_step(0.4 * done))
+        grid = grid_of(scene, size, budget)
+        patches = cut(scene, kernel, grid, np.ones(len(grid), np.int64), settings.seed)
+        if not settings.patch_size:
+            patches = finer_where_parted(scene, kernel, grid, patches, budget, settings.seed)
+            print("PATCHES", len(grid), len(patches))
+        lit = measure(patches, lambda done: on_step(0.4 * done))
     else:
         lit = _decompose(scene, kernel, budget, settings, measure, solve, lambda done: on_step(0.4 * done))
     solution = solve(lit, settings.error, lambda done: on_step(0.5 + 0.5 * done))
 
     patches = lit.patches
-    reaches = reaches_of(kernel, patches, settings.seed)
+    reaches = reaches_of(scene, kernel, patches, settings.seed)
     kinds, bright = side_kinds(patches, solution.radiosity, lit.spread, np.isinf(reaches))
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),

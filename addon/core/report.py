@@ -32,6 +32,7 @@ class Report:
     patches, receivers : counts; a patch has two sides, an unknown each
     method, solver : what ran, after "auto" has chosen; ``choice`` says why
     residuals : the solver's residual after each step, relative to the first
+    denoiser : what took noise away in the end, with its version, or "none" and why
     estimated_error : local relative RMS error of the irradiance at the receivers, which more rays make smaller
     seen_error : the same at random points of the surfaces, looked up in the result as a viewer does: with the size of
         texels, or the distance of vertices, and of patches
@@ -50,6 +51,7 @@ class Report:
     method: str = ""
     solver: str = ""
     choice: str = ""
+    denoiser: str = ""
     residuals: tuple[float, ...] = ()
     estimated_error: float = 0.0
     seen_error: float = 0.0

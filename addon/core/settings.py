@@ -35,6 +35,7 @@ class BakeSettings:
     keep_uvs : use the objects' existing "Lightmap" UV layers instead of unwrapping
     patch_size : longest edge of all patches [m]; None = chosen from the scene, and with solvers that need form factors
         the shorter, the more the light changes there
+    denoise : let Blender's denoiser improve gathered light in lightmaps where measured points say that it does
     smooth_angle_deg : faces that meet at less share vertex colours, unless the edge is sharp
     seed : same seed, same bytes
     threads : 0 = all cores
@@ -49,6 +50,7 @@ class BakeSettings:
     density: float | None = None
     keep_uvs: bool = False
     patch_size: float | None = None
+    denoise: bool = True
     smooth_angle_deg: float = 30.0
     seed: int = 0
     threads: int = 0

@@ -68,11 +68,10 @@ def solve_stochastic(
     if runs[-1].is_slow:
         runs, more = _regular(shootings, emitted_flux, runs[-1].flux, rays, unshot_limit, on_part)
         residuals += more
-    fluxes = np.stack([run.flux for run in runs]) / np.maximum(column, 1e-300)
-    errors = fluxes.std(axis=0, ddof=1) / replicates**0.5 if replicates > 1 else None
+    mean, errors = _mean_and_error([run.flux for run in runs], np.maximum(column, 1e-300))
     energy = Energy(*(float(np.mean([getattr(run.energy, name) for run in runs])) for name in Energy.__slots__))
     return Solution(
-        radiosity=fluxes.mean(axis=0),
+        radiosity=mean,
         residuals=residuals,
         energy=energy,
         rays=sum(run.rays for run in runs),
@@ -80,6 +79,17 @@ def solve_stochastic(
         error_bound=float(np.mean([run.error_bound for run in runs])),
         standard_errors=errors,
     )
+
+
+def _mean_and_error(fluxes, areas):
+    """Radiosity (N, 3), and its standard error, which one run alone does not have."""
+    mean = sum(fluxes[1:], fluxes[0].copy())
+    mean /= len(fluxes)
+    if len(fluxes) == 1:
+        return mean / areas, None
+    squares = sum((flux - mean) ** 2 for flux in fluxes)
+    mean /= areas
+    return mean, np.sqrt(squares / (len(fluxes) * (len(fluxes) - 1))) / areas
 
 
 def _mean_residuals(runs):
@@ -106,7 +116,10 @@ class _Shooting:
         received, gone = self._kernel.shoot(first_rays, self._samples, per_ray, self._seed)
         self._samples += np.diff(first_rays).astype(np.uint32)
         self.rays += int(first_rays[-1])
-        return self.reflectance * (received / scale), gone / scale
+        # in place, here and below: with millions of sides each array of theirs is 100 MB
+        reflected = received / scale
+        reflected *= self.reflectance
+        return reflected, gone / scale
 
     def bound(self, rest):
         """|r|_inf / (1 - max rho): a row of form factors sums to 1 at most."""
@@ -135,7 +148,7 @@ def _incremental(shooting, emitted, rays, unshot_limit, on_step) -> _Run:
         # what neither was reflected nor left was taken by surfaces, or by tinted glass
         absorbed += float(unshot.sum() - gone.sum() - reflected.sum())
         escaped += float(gone.sum())
-        total = total + reflected
+        total += reflected
         unshot = reflected
     energy = Energy(first, absorbed, escaped, float(unshot.sum()))
     return _Run(total, tuple(residuals), energy, shooting.rays, shooting.bound(unshot), is_slow)

@@ -6,6 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .kernel import KernelScene
+from .receivers import Receivers
+
+LIFT = 0.1  # texels above the surface, where it is looked for what stands on it
+SPREAD = 2  # texels that light is blurred over before rays see it
+TOUCHING = 2.0  # texels: receivers that are further apart are not neighbours, though their texels are
+
 
 @dataclass(frozen=True, slots=True)
 class TexelLight:
@@ -14,7 +21,7 @@ class TexelLight:
     Attributes
     ----------
     uvs : float32 (T, 3, 2) of the scene's triangles' corners, in texels; NaN without a place
-    receivers : int32 (height, width) which receiver each texel is, -1 for none
+    receivers : int32 (height, width) which receiver each texel is, -1 for none; -2 - r for receiver r, a split texel
     radiosity : float32 (N, 3) reflected radiosity of the receivers [W/m^2]
     reach : rays that hit from nearer go on [m]
     """
@@ -36,3 +43,39 @@ class TexelLight:
 NO_TEXEL_LIGHT = TexelLight(
     np.zeros((0, 3, 2), np.float32), np.zeros((0, 0), np.int32), np.zeros((0, 3), np.float32), 0.0
 )
+
+
+def split_where_blocked(kernel: KernelScene, cells, receivers: Receivers, spacing: float):
+    """The grid ``cells`` of receivers, with those marked as split that have another receiver's light but not its view.
+
+    A wall as thin as nothing that stands on a floor keeps a lit texel's light from the dark one beside it, but not from
+    rays that hit the lit one's dark half, nor from those that hit where light was blurred over both.
+    """
+    is_split = np.zeros(cells.shape, bool)
+    lifted = receivers.positions + LIFT * spacing * receivers.normals
+    for axis in (0, 1):
+        first = cells[:-1] if axis == 0 else cells[:, :-1]
+        second = cells[1:] if axis == 0 else cells[:, 1:]
+        rows, columns = np.nonzero((first >= 0) & (second >= 0))
+        one, other = first[rows, columns], second[rows, columns]
+        apart = np.linalg.norm(receivers.positions[one] - receivers.positions[other], axis=1)
+        near = apart <= TOUCHING * spacing
+        rows, columns, one, other = rows[near], columns[near], one[near], other[near]
+        blocked = kernel.occluded(lifted[one], lifted[other])
+        is_split[rows[blocked], columns[blocked]] = True
+        is_split[rows[blocked] + (axis == 0), columns[blocked] + (axis == 1)] = True
+    is_split = _widened(_widened(is_split, 0), 1)
+    return np.where(is_split & (cells >= 0), -2 - cells, cells).astype(np.int32)
+
+
+def _widened(marks, axis):
+    """Marks (H, W), with those up to SPREAD beside them along an axis."""
+    wide = marks.copy()
+    for step in range(1, SPREAD + 1):
+        low, high = np.delete(marks, np.s_[-step:], axis), np.delete(marks, np.s_[:step], axis)
+        pad = [(0, 0), (0, 0)]
+        pad[axis] = (step, 0)
+        wide |= np.pad(low, pad)
+        pad[axis] = (0, step)
+        wide |= np.pad(high, pad)
+    return wide

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import bpy
 
 from ..blender import bake_scene
+from ..blender.denoiser_library import denoiser_library
 from ..core.bake import bake
 from ..core.scene import SceneError
 from ..core.settings import BakeCancelled, SettingsError
@@ -86,11 +88,12 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
             settings = scene.patchlight.to_settings(metres_per_unit)
             subdivide = scene.patchlight.subdivide_metres(metres_per_unit)
             self._prepared = bake_scene.prepare(scene, settings, _names_to_bake(context), subdivide)
+            library = denoiser_library()
         except EXPECTED_ERRORS as error:
             self.report({"ERROR"}, _sentence(error))
             return False
         self._read_seconds = time.perf_counter() - began
-        self._job = BakeJob(bake, self._prepared.scene, settings)
+        self._job = BakeJob(partial(bake, denoiser_library=library), self._prepared.scene, settings)
         _running = self
         state = context.window_manager.patchlight
         state.is_baking, state.progress, state.stage = True, 0.0, "start"

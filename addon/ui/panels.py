@@ -31,6 +31,7 @@ class PATCHLIGHT_PT_bake(_Sidebar, bpy.types.Panel):
             column.row().prop(options, "size_mode", expand=True)
             column.prop(options, "size" if options.size_mode == "SIZE" else "density")
             column.prop(options, "keep_uvs")
+            column.prop(options, "denoise")
         else:
             column.prop(options, "smooth_angle")
             _optional(column, options, "use_subdivide", "subdivide")

@@ -100,6 +100,11 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
     keep_uvs: BoolProperty(
         name="Keep UVs", description="Use the UV layers 'Lightmap' that the objects have, instead of unwrapping them"
     )
+    denoise: BoolProperty(
+        name="Denoise",
+        description="Let Open Image Denoise, which Blender has, improve the result where measured points say it does",
+        default=DEFAULTS.denoise,
+    )
     only_selected: BoolProperty(
         name="Selected Only", description="Bake only selected objects; the others still block and reflect light"
     )
@@ -146,6 +151,7 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
             keep_uvs=self.target == "lightmap" and self.keep_uvs,
             patch_size=self.patch_size * metres_per_unit if self.use_patch_size else None,
             smooth_angle_deg=degrees(self.smooth_angle),
+            denoise=self.denoise,
             seed=self.seed,
             threads=self.threads,
         )

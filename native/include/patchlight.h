@@ -241,7 +241,8 @@ typedef struct pl_solution {
  *
  *   uvs        6 * triangle_count, which is the scene's: corners in texels, as in pl_rasterise_texels; NaN without a
  *              place
- *   receivers  width * height: which receiver each texel is, -1 for none
+ *   receivers  width * height: which receiver each texel is, -1 for none; -2 - r for receiver r where the texel lies on
+ *              both sides of something thin: rays that hit it go on, from however far they come
  *   radiosity  3 * receiver_count: reflected radiosity
  *   reach      rays that hit from nearer [m] do not take a texel's light, which may lie half under something, but go on
  */

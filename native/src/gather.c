@@ -72,14 +72,18 @@ static void sample_direct(gather_job *job, const pl_hit *hit, size_t side, ray_r
         io_sum[k] += rgb[k] * weight[k] * job->solution->reflectance[3 * (side / 2) + (size_t)k];
 }
 
-/* The radiosity of the texel that a ray hits; NULL where there is none. */
-static const float *texel_hit(const pl_texel_light *texels, const pl_hit *hit) {
+/* The radiosity of the texel that a ray hits, and whether it lies on both sides of something; NULL where there is none.
+ */
+static const float *texel_hit(const pl_texel_light *texels, const pl_hit *hit, bool *out_is_split) {
     const float *uv = texels->uvs + 6 * (size_t)hit->triangle;
     const float u = uv[0] + hit->u * (uv[2] - uv[0]) + hit->v * (uv[4] - uv[0]);
     const float v = uv[1] + hit->u * (uv[3] - uv[1]) + hit->v * (uv[5] - uv[1]);
     if (!(u >= 0 && v >= 0 && u < (float)texels->width && v < (float)texels->height))
         return NULL;
-    const int32_t receiver = texels->receivers[(size_t)v * (size_t)texels->width + (size_t)u];
+    int32_t receiver = texels->receivers[(size_t)v * (size_t)texels->width + (size_t)u];
+    *out_is_split = receiver < -1;
+    if (*out_is_split)
+        receiver = -2 - receiver;
     return receiver < 0 || (size_t)receiver >= texels->receiver_count ? NULL : texels->radiosity + 3 * (size_t)receiver;
 }
 
@@ -108,8 +112,9 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         }
         const bool is_back = step == 0 ? sees_back(frame, direction, &hit) : hit.is_back;
         const bool is_last = step == MOST_STEPS - 1;
-        const float *seen = job->texels && !is_back ? texel_hit(job->texels, &hit) : NULL;
-        const bool takes_texel = seen && (hit.distance >= job->texels->reach || is_last);
+        bool is_split = false;
+        const float *seen = job->texels && !is_back ? texel_hit(job->texels, &hit, &is_split) : NULL;
+        const bool takes_texel = seen && ((hit.distance >= job->texels->reach && !is_split) || is_last);
         /* most rays end here, before the patches are touched: what they cost is cache misses */
         if (takes_texel && (step || !job->has_bright_sides)) {
             add(io_sum, seen, weight);
@@ -118,7 +123,9 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         const size_t side = 2 * (size_t)patch_at(job->patches, hit.triangle, hit.u, hit.v) + is_back;
         if (step == 0 && solution->kinds[side] == PL_SIDE_LIGHT)
             return;
-        if (seen ? takes_texel : take_patch(job, &hit, side, is_last)) {
+        /* patches let a little light through walls that part them: backs, which no texel has, are not to pass it on */
+        const bool goes_on = step == 0 && is_back && job->texels;
+        if (seen ? takes_texel : !goes_on && take_patch(job, &hit, side, is_last)) {
             add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
             return;
         }
@@ -126,7 +133,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             sample_direct(job, &hit, side, &random, weight, io_sum);
         else
             add(io_sum, solution->direct + 3 * side, weight);
-        if (!seen && is_far(job, &hit, side)) {
+        if (!seen && !goes_on && is_far(job, &hit, side)) {
             for (size_t k = 3 * side; k < 3 * side + 3; ++k)
                 io_sum[k - 3 * side] += weight[k - 3 * side] * (solution->radiosity[k] - solution->direct[k]);
             return;

@@ -159,7 +159,7 @@ def test_options_that_contradict_each_other_are_an_error(room):
 def test_a_bug_in_the_bake_is_not_called_finished(room, monkeypatch):
     from addon.ui import operators
 
-    monkeypatch.setattr(operators, "bake", lambda *_args: 1 / 0)
+    monkeypatch.setattr(operators, "bake", lambda *_args, **_options: 1 / 0)
     with pytest.raises(RuntimeError, match="ZeroDivisionError"):
         bpy.ops.patchlight.bake()
     assert "patchlight_lightmap" not in room

@@ -46,7 +46,9 @@ def light_at(threads, method, solver):
         solved = solve_radiosity(scene, kernel, emitters, settings, lambda done: None)
         receivers, _ = vertex_receivers(scene, 30.0)
         seen = SeenPoints(receivers, lambda values: values)
-        light = gather_irradiance(kernel, solved, receivers, None, seen, 0.1, 0, lambda: np.inf, lambda done: None)
+        light = gather_irradiance(
+            kernel, solved, receivers, None, seen, 0.1, 0, None, lambda: np.inf, lambda done: None
+        )
     field = [np.ascontiguousarray(array).tobytes() for array in solved.patches.arrays()]
     return solved.solution.radiosity.tobytes(), field, light.values.tobytes(), {**solved.rays, **light.rays}
 

@@ -54,6 +54,7 @@ def full_light(scene, receivers, threads=2, **settings):
             seen=SeenPoints(receivers, lambda values: values),
             error=settings.error,
             seed=settings.seed,
+            denoise=None,
             seconds_left=lambda: np.inf,
             on_step=lambda done: None,
         )

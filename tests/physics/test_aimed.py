@@ -41,7 +41,9 @@ def test_a_blocker_hides_all_or_half(estimator):
 
 def test_random_blockers_against_pairs_of_random_points(estimator):
     rng = np.random.default_rng(0)
-    blockers = [rng.random(3) * (1, 1, 0.6) + (0, 0, 0.2) + rng.uniform(-0.5, 0.5, (3, 3)) * (1, 1, 0.3) for _ in range(5)]
+    blockers = [
+        rng.random(3) * (1, 1, 0.6) + (0, 0, 0.2) + rng.uniform(-0.5, 0.5, (3, 3)) * (1, 1, 0.3) for _ in range(5)
+    ]
     found = estimator.factor(FLOOR, CEILING, [surface(f"blocker{k}", corners) for k, corners in enumerate(blockers)])
     mean, error = exchange(FLOOR.pieces[0], CEILING.pieces[0], blockers, 400_000, rng)
     # 99 % of ours, four standard errors of theirs

@@ -1,0 +1,53 @@
+"""What a denoiser makes of gathered light, taken as far as measured probes say that it is nearer to the truth.
+
+It knows what light looks like, not what is there: where noise and detail look alike it is wrong, and does not say how
+wrong. So the two estimates are mixed by how far they are apart, in shares by least squares at the probes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .emitters import LUMINANCE
+from .gaps import fill_gaps
+from .probes import Measured
+from .relative import scale_of
+from .smoothing import TexelGrid
+
+SHARES = 8  # by how far the estimates are apart, each fitted at as many probes,
+LEAST_PROBES_OF_SHARE = 128  # and at no fewer than so many
+
+
+def denoised(denoise, grid: TexelGrid, values, direct, gathered, chosen, probes: Measured):
+    """Irradiance ``values`` (N, 3) moved towards direct plus what ``denoise`` makes of raw ``gathered`` light (N, 3).
+
+    Parameters
+    ----------
+    denoise : image float32 (H, W, 3) -> the same without noise
+    chosen : receivers (K,) that ``probes`` measured
+    """
+    is_set = grid.receivers >= 0
+    order = grid.receivers[is_set]
+    image = np.zeros((*is_set.shape, 3), np.float32)
+    image[is_set] = (direct + gathered)[order]
+    fill_gaps(image, is_set)
+    clean = np.empty_like(gathered)
+    clean[order] = denoise(image)[is_set]
+    # where there is no gathered light, to the bit, there is none
+    usable = np.isfinite(clean) & (values != direct)
+    other = np.where(usable, np.maximum(clean, 0), values).astype(np.float32)
+    return mixed(values, other, chosen, probes)
+
+
+def mixed(first, second, chosen, probes: Measured):
+    """Two estimates (N, 3) of irradiance, mixed so that the error is least at the probes: float32 (N, 3)."""
+    scale = scale_of(first)
+    apart = (second - first) @ LUMINANCE / scale
+    count = max(1, min(SHARES, len(chosen) // LEAST_PROBES_OF_SHARE))
+    bounds = np.quantile(np.abs(apart[chosen]), np.linspace(0, 1, count + 1)[1:-1])
+    group = np.searchsorted(bounds, np.abs(apart))
+    # one wrong point counts as one, however wrong
+    wanted = np.clip((probes.luminance - first[chosen] @ LUMINANCE) / scale[chosen], -1, 1)
+    along = np.bincount(group[chosen], wanted * apart[chosen], count)
+    shares = np.clip(along / np.maximum(np.bincount(group[chosen], apart[chosen] ** 2, count), 1e-30), 0, 1)
+    return (first + shares[group, None] * (second - first)).astype(np.float32)

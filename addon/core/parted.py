@@ -1,0 +1,42 @@
+"""Patches that something parts in two, as a wall does the one floor of two rooms: their mean would leak under it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernel import KernelScene
+from .patches import Grid, Patches, cut
+from .scene import Scene
+
+POINTS, LIFT = 8, 0.05  # of a side, so many patch sizes above it: where it is looked for what stands on it,
+LARGE = 0.05  # if it has so much of a full-size patch's area
+ALONG = (4, 2)  # patches along the sides of a cell that is parted, as long as there are not too many
+
+
+def is_parted(scene: Scene, kernel: KernelScene, patches: Patches, seed: int):
+    """Sides on which something stands between their own points, bool (2 P,)."""
+    chosen = np.flatnonzero(patches.areas > LARGE * patches.size**2)
+    triangles, barycentrics = kernel.patch_points(chosen, POINTS, seed)
+    corners = scene.corners[triangles]
+    along = corners[:, 1:] - corners[:, :1]
+    # from a corner: weights of float32 do not sum to 1, which far from the origin is metres
+    points = corners[:, 0] + np.einsum("nk,nkc->nc", barycentrics[:, 1:].astype(np.float64), along)
+    normals = np.cross(along[:, 0], along[:, 1])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    found = np.zeros((len(patches), 2), bool)
+    for side, sign in enumerate((1, -1)):
+        lifted = (points + sign * LIFT * patches.size * normals).reshape(len(chosen), POINTS, 3)
+        blocked = kernel.occluded(lifted[:, :-1].reshape(-1, 3), lifted[:, 1:].reshape(-1, 3))
+        found[chosen, side] = blocked.reshape(len(chosen), POINTS - 1).any(axis=1)
+    return found.ravel()
+
+
+def finer_where_parted(
+    scene: Scene, kernel: KernelScene, grid: Grid, patches: Patches, most: int, seed: int
+) -> Patches:
+    """Patches of a grid, one a cell, with those that are parted cut into smaller ones, ``most`` more in all."""
+    parted = is_parted(scene, kernel, patches, seed).reshape(-1, 2).any(axis=1)
+    for along in ALONG:
+        if 0 < (along**2 - 1) * parted.sum() <= most:
+            return cut(scene, kernel, grid, np.where(parted, along, 1), seed)
+    return patches

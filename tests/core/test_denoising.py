@@ -1,0 +1,96 @@
+"""The denoiser: its library by C API, what is made of its estimate, and what the report says where there is none."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from addon.core.bake import bake
+from addon.core.denoiser import Denoiser, DenoiserError, opened
+from addon.core.denoising import mixed
+from addon.core.probes import Measured
+from addon.core.settings import BakeSettings
+from tests.scenes import closed_box, lamp
+
+SETTINGS = BakeSettings(texels=1 << 14, error=0.1, threads=2)
+
+
+@pytest.fixture
+def library():
+    from addon.blender.denoiser_library import denoiser_library
+
+    found = denoiser_library()
+    assert found is not None, "the module bpy has its library beside it"
+    return found
+
+
+def gradient_with_noise():
+    x = np.linspace(1, 2, 96)
+    clean = np.broadcast_to(x[None, :, None], (64, 96, 3)).astype(np.float32)
+    return clean, clean * np.random.default_rng(0).normal(1, 0.2, clean.shape).astype(np.float32)
+
+
+def test_noise_goes_and_light_stays(library):
+    clean, noisy = gradient_with_noise()
+    with Denoiser(library, 2) as denoise:
+        result = denoise(noisy)
+        assert denoise.name.startswith("Open Image Denoise 2.")
+        assert denoise.failure == ""
+    # noise of 20 %, alike over 6144 texels: a tenth is left of it, and 20 % / 6144^0.5 of the mean
+    assert np.abs(result / clean - 1).std() < 0.02
+    assert result.mean() == pytest.approx(clean.mean(), rel=0.01)
+
+
+def test_the_same_bytes_with_any_number_of_threads(library):
+    noisy = gradient_with_noise()[1]
+    results = []
+    for threads in (1, 2, 4):
+        with Denoiser(library, threads) as denoise:
+            results.append(denoise(noisy).tobytes())
+    assert results[0] == results[1] == results[2]
+
+
+def test_what_is_no_library_is_told_and_stops_nothing(tmp_path):
+    wrong = tmp_path / "libOpenImageDenoise.so"
+    wrong.write_bytes(b"nothing")
+    with pytest.raises(DenoiserError, match=str(wrong)):
+        Denoiser(wrong, 1)
+    report = bake(closed_box(lights=[lamp()]), SETTINGS, denoiser_library=wrong).report
+    assert report.denoiser.startswith("none: Open Image Denoise cannot be loaded")
+
+
+@pytest.mark.parametrize(
+    ("settings", "library", "why"),
+    [
+        (SETTINGS, None, "no library"),
+        (replace(SETTINGS, denoise=False), Path("any"), "not asked for"),
+        (replace(SETTINGS, target="vertex"), Path("any"), "vertex colours are no image"),
+    ],
+)
+def test_why_there_is_none(settings, library, why):
+    with opened(library, settings) as (denoise, reason):
+        assert denoise is None
+        assert why in reason
+
+
+def test_two_estimates_are_mixed_where_the_probes_find_each_better():
+    rng = np.random.default_rng(0)
+    truth, count = np.ones((4096, 3)), 4096
+    first, second = truth.copy(), truth.copy()
+    # the second is right where the first is a little off, and far off where the first is right
+    first[:2048] += 0.1
+    second[2048:] += 0.5 + 0.1 * rng.random((2048, 1))
+    chosen = np.arange(0, count, 2)
+    found = mixed(first, second, chosen, Measured(np.ones(len(chosen)), np.zeros(len(chosen)), 0))
+    # luminance weights sum to 1 within float32
+    assert np.abs(found - truth).max() < 1e-4
+
+
+def test_a_bake_with_it_is_no_worse_and_dark_rooms_stay_dark(library):
+    scene = closed_box(lights=[lamp()])
+    plain = bake(scene, SETTINGS).report
+    helped = bake(scene, SETTINGS, denoiser_library=library).report
+    assert helped.estimated_error <= plain.estimated_error
+    dark = bake(closed_box(), SETTINGS, denoiser_library=library)
+    assert (dark.lightmap.pixels == 0).all()
