@@ -34,7 +34,7 @@ FREE_RAYS = 1 << 26
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
 AIM = 0.9  # of the target: what receivers are due is an estimate
-DENOISE = 1.15  # times the target: nearer to it the denoiser is asked, and when nothing else helps
+DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
 SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
 MOST_EXTRA = 2  # passes after that, each with four times the rays: speckles are gone by then
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
@@ -282,7 +282,7 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
         probes = probes or _measure(job.part(chosen), error, seed + 1)
         smooth, relative, squares = _best_estimate(job, grid, means, direct, chosen, probes)
         found = _Found(smooth, squares, False)
-        is_asked = rms_of(squares) <= DENOISE * error
+        is_asked = error < rms_of(squares) <= DENOISE * error
         if is_asked:
             found = _denoised(job, grid, found, means, direct, chosen, probes)
         squares = found.squares
