@@ -276,7 +276,7 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
         rays += _gather_pass(job, active, taken, further, seed, sums, lambda done: on_step(begin + width * done))  # noqa: B023
         begin += width
         budget = budget or int(max(MOST_COST * rays, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
-        means, before = sums / taken[:, None, None], rms
+        means, before = sums / taken[:, None, None].astype(np.float32), rms
         if grid:
             job = _seeing(job, grid, direct, means)
         probes = probes or _measure(job.part(chosen), error, seed + 1)
