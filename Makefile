@@ -19,7 +19,7 @@ KERNEL := addon/core/_kernel.abi3.so
 KERNEL_SOURCES := $(wildcard native/src/*.c)
 DOOR_SOURCES := $(wildcard native/python/*.c)
 KERNEL_HEADERS := $(wildcard native/include/*.h native/src/*.h native/python/*.h)
-C_FILES := $(KERNEL_SOURCES) $(DOOR_SOURCES) $(KERNEL_HEADERS) $(wildcard tests/native/*.[ch])
+C_FILES := $(KERNEL_SOURCES) $(DOOR_SOURCES) $(KERNEL_HEADERS) $(wildcard tests/native/*.[ch] tests/bench/*.c)
 
 WARNINGS := -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Werror
 SANITIZE := -std=c11 -O1 -g -ffp-contract=off -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all

@@ -123,7 +123,12 @@ def _add_bake(commands):
     add("--subdivide", type=float, metavar="METRES", help="cut larger faces first (target vertex)")
     add("--patch-size", type=float, metavar="METRES", help="longest edge of a patch (default: by the scene)")
     add("--no-denoise", action="store_true", help="keep Blender's denoiser out of lightmaps")
-    add("--seed", type=int, default=DEFAULTS.seed, help="the same seed gives the same bytes (default: %(default)s)")
+    add(
+        "--seed",
+        type=int,
+        default=DEFAULTS.seed,
+        help="the same seed gives the same bytes, denoised on the same machine (default: %(default)s)",
+    )
     add("--threads", type=int, default=DEFAULTS.threads, metavar="N", help="0 = all cores (default)")
     add("--report", type=Path, metavar="OUT.json", help="write seconds, rays, error and warnings as JSON")
     add("--exr", type=Path, metavar="DIR", help="write the lightmap as DIR/OUT.exr, too")

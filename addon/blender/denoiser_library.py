@@ -19,8 +19,8 @@ def denoiser_library() -> Path | None:
     """The library that this Blender denoises with, else the system's, as distributions have it; None: there is none."""
     folder = Path(bpy.utils.resource_path("LOCAL")).parent
     # not its parts, whose names go on: _core, _device_cpu
-    found = [path for path in sorted(folder.glob(PATTERNS.get(sys.platform, ""))) if "_" not in path.name]
+    found = [path for path in folder.glob(PATTERNS.get(sys.platform, "none")) if "_" not in path.name]
     if found:
-        return found[0]
+        return min(found)
     name = ctypes.util.find_library("OpenImageDenoise")
     return Path(name) if name else None

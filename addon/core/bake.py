@@ -60,7 +60,7 @@ def bake(
     progress = Progress(on_progress, STAGE_SHARES)
     with (
         Workers(settings.thread_count) as workers,
-        denoiser.opened(denoiser_library, settings) as (denoise, no_denoiser),
+        denoiser.opened(denoiser_library, settings, progress.poll) as (denoise, no_denoiser),
     ):
         if settings.target == "lightmap":
             progress.begin("unwrap")

@@ -1,4 +1,4 @@
-"""What a denoiser makes of gathered light, taken as far as measured probes say that it is nearer to the truth.
+"""What a denoiser makes of a bake's light, taken as far as measured probes say that it is nearer to the truth.
 
 It knows what light looks like, not what is there: where noise and detail look alike it is wrong, and does not say how
 wrong. So the two estimates are mixed by how far they are apart, in shares by least squares at the probes.
@@ -19,11 +19,11 @@ LEAST_PROBES_OF_SHARE = 128  # and at no fewer than so many
 
 
 def denoised(denoise, grid: TexelGrid, values, direct, gathered, chosen, probes: Measured):
-    """Irradiance ``values`` (N, 3) moved towards direct plus what ``denoise`` makes of raw ``gathered`` light (N, 3).
+    """Irradiance ``values`` (N, 3) moved towards what ``denoise`` makes of raw direct plus ``gathered`` light (N, 3).
 
     Parameters
     ----------
-    denoise : image float32 (H, W, 3) -> the same without noise
+    denoise : image float32 (H, W, 3) -> the same without noise, or None
     chosen : receivers (K,) that ``probes`` measured
     """
     is_set = grid.receivers >= 0
@@ -31,8 +31,11 @@ def denoised(denoise, grid: TexelGrid, values, direct, gathered, chosen, probes:
     image = np.zeros((*is_set.shape, 3), np.float32)
     image[is_set] = (direct + gathered)[order]
     fill_gaps(image, is_set)
+    result = denoise(image)
+    if result is None:
+        return values
     clean = np.empty_like(gathered)
-    clean[order] = denoise(image)[is_set]
+    clean[order] = result[is_set]
     # where there is no gathered light, to the bit, there is none
     usable = np.isfinite(clean) & (values != direct)
     other = np.where(usable, np.maximum(clean, 0), values).astype(np.float32)

@@ -201,7 +201,10 @@ def _measure(job: _Job, error, seed) -> Measured:
     pilot, spread, traced = _gathered(job, max(count // PILOT, 1), seed)
     quiet = np.sqrt(spread / PILOT) <= error * scale_of(direct + pilot.mean(axis=1))
     rays += traced
-    for part, share, own in ((quiet, count, seed + 1), (~quiet, min(MORE_RAYS * count, MOST_PROBE_RAYS), seed + 2)):
+    for part, share, own in (
+        (quiet, count, seed + 1),
+        (~quiet, max(min(MORE_RAYS * count, MOST_PROBE_RAYS), 2 * count), seed + 2),
+    ):
         gathered, spread, traced = _gathered(job.part(np.flatnonzero(part)), share, own)
         values[part] += gathered.mean(axis=1)
         noise[part] += spread

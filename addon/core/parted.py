@@ -8,27 +8,39 @@ from .kernel import KernelScene
 from .patches import Grid, Patches, cut
 from .scene import Scene
 
-POINTS, LIFT = 8, 0.05  # of a side, so many patch sizes above it: where it is looked for what stands on it,
-LARGE = 0.05  # if it has so much of a full-size patch's area
+POINTS, LIFT = 8, 0.05  # of a side, so many of its sizes above it: where it is looked for what stands on it,
+LARGE = 0.05  # if its cell has so much of a full-size patch's area
+AT_ONCE = 1 << 15  # patches, for which points take 60 MB
 ALONG = (4, 2)  # patches along the sides of a cell that is parted, as long as there are not too many
 
 
 def is_parted(scene: Scene, kernel: KernelScene, patches: Patches, seed: int):
     """Sides on which something stands between their own points, bool (2 P,)."""
-    chosen = np.flatnonzero(patches.areas > LARGE * patches.size**2)
+    cell_areas = np.bincount(patches.cells, patches.areas)[patches.cells]
+    large = np.flatnonzero((cell_areas > LARGE * patches.size**2) & (patches.areas > 0))
+    found = np.zeros((len(patches), 2), bool)
+    for start in range(0, len(large), AT_ONCE):
+        chosen = large[start : start + AT_ONCE]
+        found[chosen] = _blocked_sides(scene, kernel, patches, chosen, seed)
+    return found.ravel()
+
+
+def _blocked_sides(scene, kernel, patches, chosen, seed):
+    """The same of the fronts and the backs of some patches, bool (K, 2)."""
     triangles, barycentrics = kernel.patch_points(chosen, POINTS, seed)
     corners = scene.corners[triangles]
     along = corners[:, 1:] - corners[:, :1]
     # from a corner: weights of float32 do not sum to 1, which far from the origin is metres
     points = corners[:, 0] + np.einsum("nk,nkc->nc", barycentrics[:, 1:].astype(np.float64), along)
     normals = np.cross(along[:, 0], along[:, 1])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    found = np.zeros((len(patches), 2), bool)
+    lengths = np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
+    lifts = normals * (LIFT * np.sqrt(np.repeat(patches.areas[chosen], POINTS)) / lengths)[:, None]
+    blocked = np.zeros((len(chosen), 2), bool)
     for side, sign in enumerate((1, -1)):
-        lifted = (points + sign * LIFT * patches.size * normals).reshape(len(chosen), POINTS, 3)
-        blocked = kernel.occluded(lifted[:, :-1].reshape(-1, 3), lifted[:, 1:].reshape(-1, 3))
-        found[chosen, side] = blocked.reshape(len(chosen), POINTS - 1).any(axis=1)
-    return found.ravel()
+        lifted = (points + sign * lifts).reshape(len(chosen), POINTS, 3)
+        between = kernel.occluded(lifted[:, :-1].reshape(-1, 3), lifted[:, 1:].reshape(-1, 3))
+        blocked[:, side] = between.reshape(len(chosen), POINTS - 1).any(axis=1)
+    return blocked
 
 
 def finer_where_parted(

@@ -32,7 +32,8 @@ class PatchSolution:
     direct : float32 (2 P, 3) the part of it that is the lights' direct light reflected once [W/m^2]
     reflectance : float32 (P, 3)
     kinds : uint8 (2 P,) EVEN, MIXED (lights reach one part of the side only) or LIGHT (receivers sample it as a light)
-    reaches : float32 (2 P,) rays that hit from nearer do not take the side's mean [m]; inf in narrow gaps
+    reaches : float32 (2 P,) rays that hit from nearer do not take the side's mean [m]; inf in narrow gaps, and
+        where something parts them in two
     sky : float32 (1, 3) pi times the world's radiance [W/m^2]
     """
 
@@ -75,12 +76,14 @@ def side_kinds(patches, radiosity, spread, is_confined):
 
 
 def reaches_of(scene: Scene, kernel: KernelScene, patches: Patches, seed: int):
-    """From how near a side's mean is not to be taken, float32 (2 P,) [m]: never, in a gap narrower than its patch, or
-    where something parts it in two."""
+    """From how near a side's mean is not to be taken, float32 (2 P,) [m], and which sides are confined, bool (2 P,).
+
+    Never, in a gap narrower than its patch (confined), or where something parts it in two.
+    """
     reaches = np.repeat(REACH * np.sqrt(patches.areas), 2).astype(np.float32)
-    reaches[kernel.openness(reaches, OPENNESS_RAYS, seed) < CONFINED] = np.inf
-    reaches[is_parted(scene, kernel, patches, seed)] = np.inf
-    return reaches
+    is_confined = kernel.openness(reaches, OPENNESS_RAYS, seed) < CONFINED
+    reaches[is_confined | is_parted(scene, kernel, patches, seed)] = np.inf
+    return reaches, is_confined
 
 
 def _brightest(luminance, areas, share):

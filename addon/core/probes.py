@@ -59,8 +59,13 @@ class Measured:
 
 
 def rms_of(squares) -> float:
-    """Root of the mean of squared errors, of which some may be below 0 by noise; 0 of none."""
-    return float(np.sqrt(max(squares.mean(), 0.0))) if len(squares) else 0.0
+    """Root of the mean of squared errors, of which some may be below 0 by noise; 0 of none.
+
+    Never below what that mean itself may be off by: probes that are less sure than that cannot say there is none.
+    """
+    if not len(squares):
+        return 0.0
+    return float(np.sqrt(max(squares.mean(), squares.std() / len(squares) ** 0.5)))
 
 
 def probe_count(receivers: int) -> int:

@@ -81,15 +81,14 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
         patches = cut(scene, kernel, grid, np.ones(len(grid), np.int64), settings.seed)
         if not settings.patch_size:
             patches = finer_where_parted(scene, kernel, grid, patches, budget, settings.seed)
-            print("PATCHES", len(grid), len(patches))
         lit = measure(patches, lambda done: on_step(0.4 * done))
     else:
         lit = _decompose(scene, kernel, budget, settings, measure, solve, lambda done: on_step(0.4 * done))
     solution = solve(lit, settings.error, lambda done: on_step(0.5 + 0.5 * done))
 
     patches = lit.patches
-    reaches = reaches_of(scene, kernel, patches, settings.seed)
-    kinds, bright = side_kinds(patches, solution.radiosity, lit.spread, np.isinf(reaches))
+    reaches, is_confined = reaches_of(scene, kernel, patches, settings.seed)
+    kinds, bright = side_kinds(patches, solution.radiosity, lit.spread, is_confined)
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),
         direct=(patches.side_reflectance * lit.direct).astype(np.float32),

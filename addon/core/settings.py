@@ -37,7 +37,7 @@ class BakeSettings:
         the shorter, the more the light changes there
     denoise : let Blender's denoiser improve gathered light in lightmaps where measured points say that it does
     smooth_angle_deg : faces that meet at less share vertex colours, unless the edge is sharp
-    seed : same seed, same bytes
+    seed : same seed, same bytes; denoised, on the same processor and Blender only
     threads : 0 = all cores
     """
 

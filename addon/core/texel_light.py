@@ -11,6 +11,7 @@ from .receivers import Receivers
 
 LIFT = 0.1  # texels above the surface, where it is looked for what stands on it
 SPREAD = 2  # texels that light is blurred over before rays see it
+BAND = 256  # rows of the grid at once
 TOUCHING = 2.0  # texels: receivers that are further apart are not neighbours, though their texels are
 
 
@@ -52,20 +53,30 @@ def split_where_blocked(kernel: KernelScene, cells, receivers: Receivers, spacin
     rays that hit the lit one's dark half, nor from those that hit where light was blurred over both.
     """
     is_split = np.zeros(cells.shape, bool)
-    lifted = receivers.positions + LIFT * spacing * receivers.normals
-    for axis in (0, 1):
-        first = cells[:-1] if axis == 0 else cells[:, :-1]
-        second = cells[1:] if axis == 0 else cells[:, 1:]
-        rows, columns = np.nonzero((first >= 0) & (second >= 0))
-        one, other = first[rows, columns], second[rows, columns]
-        apart = np.linalg.norm(receivers.positions[one] - receivers.positions[other], axis=1)
-        near = apart <= TOUCHING * spacing
-        rows, columns, one, other = rows[near], columns[near], one[near], other[near]
-        blocked = kernel.occluded(lifted[one], lifted[other])
-        is_split[rows[blocked], columns[blocked]] = True
-        is_split[rows[blocked] + (axis == 0), columns[blocked] + (axis == 1)] = True
+    for top in range(0, len(cells), BAND):
+        # with the first row of the next band
+        band = slice(top, top + BAND + 1)
+        for step in ((1, 0), (0, 1)):
+            rows, columns = _blocked(kernel, cells[band], step, receivers, spacing)
+            is_split[top + rows, columns] = True
+            is_split[top + rows + step[0], columns + step[1]] = True
     is_split = _widened(_widened(is_split, 0), 1)
     return np.where(is_split & (cells >= 0), -2 - cells, cells).astype(np.int32)
+
+
+def _blocked(kernel, cells, step, receivers, spacing):
+    """Texels of a band that do not see the one a ``step`` (rows, columns) on: their rows and columns."""
+    height, width = cells.shape
+    first, second = cells[: height - step[0], : width - step[1]], cells[step[0] :, step[1] :]
+    rows, columns = np.nonzero((first >= 0) & (second >= 0))
+    one, other = first[rows, columns], second[rows, columns]
+    start, end = receivers.positions[one], receivers.positions[other]
+    near = ((end - start) ** 2).sum(axis=1) <= (TOUCHING * spacing) ** 2
+    start, end = start[near], end[near]
+    start += LIFT * spacing * receivers.normals[one[near]]
+    end += LIFT * spacing * receivers.normals[other[near]]
+    blocked = kernel.occluded(start, end)
+    return rows[near][blocked], columns[near][blocked]
 
 
 def _widened(marks, axis):

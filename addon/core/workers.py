@@ -22,7 +22,7 @@ class Progress:
         self.seconds: dict[str, float] = {}
         self._on_progress = on_progress
         self._shares = shares
-        self._stage = ""
+        self._stage, self._done = "", 0.0
         self._started = time.perf_counter()
         self._stage_started = self._started
 
@@ -35,12 +35,17 @@ class Progress:
 
     def step(self, done: float) -> None:
         """Tell that so much (0..1) of the stage is done."""
+        self._done = done
         if self._on_progress is None:
             return
         before = sum(self._shares[name] for name in self.seconds if name in self._shares)
         whole = before + self._shares.get(self._stage, 0.0) * min(max(done, 0.0), 1.0)
         if not self._on_progress(self._stage, min(whole, 1.0)):
             raise BakeCancelled("the bake was cancelled")
+
+    def poll(self) -> None:
+        """Give the callback its say where nothing more is done yet; raises BakeCancelled as ``begin`` does."""
+        self.step(self._done)
 
     def end(self) -> None:
         """Close the stage that runs and note its seconds."""

@@ -219,7 +219,7 @@ void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
  *   kinds        2 * patch_count, a pl_side_kind each
  *   reaches      2 * patch_count: a ray that hits a side from nearer than this [m] does not take its mean
  *                but goes on from the point hit, as the patch may lie half under something; INFINITY for a
- *                side in a gap narrower than its patch, where no mean can stand for the light
+ *                side in a gap narrower than its patch, or parted by something, where no mean can stand for the light
  *   sky          pi * the radiance of what rays see that leave the scene
  */
 typedef enum pl_side_kind {
@@ -245,6 +245,8 @@ typedef struct pl_solution {
  *              both sides of something thin: rays that hit it go on, from however far they come
  *   radiosity  3 * receiver_count: reflected radiosity
  *   reach      rays that hit from nearer [m] do not take a texel's light, which may lie half under something, but go on
+ *
+ * Backs have no texels: with these given, a receiver's ray that hits one first does not take the patch's mean, but goes on.
  */
 typedef struct pl_texel_light {
     const float *uvs;

@@ -32,11 +32,12 @@ static double exact_distance(const pl_scene *scene, int32_t triangle, vec3 origi
 pl_hit hit_at_edge(const pl_scene *scene, vec3 origin, vec3 direction, float near, pl_hit hit) {
     double nearest = exact_distance(scene, hit.triangle, origin, direction);
     /* rays beside it find the others that meet there: as far off as rounding cannot bridge, 2^-20 of all coordinates */
-    const float off = 9.5367431640625e-7f * fmaxf(1, scene->reach / fmaxf(hit.distance, 1e-30f));
+    const float length = vec3_length(direction);
+    const float off = 9.5367431640625e-7f * fmaxf(length, scene->reach / fmaxf(hit.distance, 1e-30f));
     vec3 u, v;
     vec3_basis(vec3_unit(direction), &u, &v);
     for (int side = 0; side < 4; ++side) {
-        const vec3 beside = vec3_mul_add(side & 1 ? v : u, (side & 2 ? off : -off) * vec3_length(direction), direction);
+        const vec3 beside = vec3_mul_add(side & 1 ? v : u, side & 2 ? off : -off, direction);
         pl_hit other = opaque_hit(scene, origin, beside, near);
         if (other.triangle < 0)
             continue;

@@ -47,11 +47,11 @@ def main() -> None:
         open_blend(args.blend or next(p for p in demo.save_demo(folder) if p.stem == "room"))
         settings = BakeSettings(texels=args.texels, error=0.2)
         scene = sound_faces(bake_scene.prepare(bpy.context.scene, settings).scene).scene
-    print("| kernel | rays | ours [M rays/s] | bare loop [M rays/s] | of the bare loop |")
-    print("| --- | --- | --- | --- | --- |")
-    with Workers(1) as workers:
-        for name, run in kernels(scene, settings, workers, args.receivers).items():
-            print_row(name, *measured(recorder, run))
+        print("| kernel | rays | ours [M rays/s] | bare loop [M rays/s] | of the bare loop |")
+        print("| --- | --- | --- | --- | --- |")
+        with Workers(1) as workers:
+            for name, run in kernels(scene, settings, workers, args.receivers).items():
+                print_row(name, *measured(recorder, run))
 
 
 def arguments():

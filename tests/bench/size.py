@@ -2,8 +2,8 @@
 
     python tests/bench/size.py [--quick] [--error E] [--out DIR]
 
-Each bake runs in a process of its own. Under each table stands the exponent of every stage that takes a second or more,
-from the smallest to the largest bake, beside that of N log N. ``--quick`` leaves the largest out.
+Each bake runs in a process of its own, without a denoiser. Under each table stands the exponent of every stage that
+takes a second or more, from the smallest to the largest bake, beside that of N log N. ``--quick``: not the largest.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ USUAL_TRIANGLES, USUAL_TEXELS = 10**5, 1 << 20
 QUICK = 2  # the first so many of each
 STAGES = ("unwrap", "texels", "solve", "gather")
 LEAST_SECONDS = 1.0  # of a stage whose exponent is told
-ALLOWED_BYTES = (2 << 30, 64, 400)  # at all, a texel, a triangle
+ALLOWED_BYTES = (2 << 30, 64, 400)  # at all, a texel, a triangle: what a bake is meant to take at most
 
 
 def main() -> None:
@@ -201,13 +201,13 @@ def print_table(title, rows) -> None:
 def print_exponents(rows, size) -> None:
     """p of seconds ~ size^p between the first and the last, and what N log N would have."""
     first, last = rows[0], rows[-1]
-    decades = math.log(last[size] / first[size])
+    span = math.log(last[size] / first[size])
     told = [
-        f"{stage} {math.log(last['seconds'][stage] / first['seconds'][stage]) / decades:.2f}"
+        f"{stage} {math.log(last['seconds'][stage] / first['seconds'][stage]) / span:.2f}"
         for stage in STAGES
         if last["seconds"][stage] >= LEAST_SECONDS and first["seconds"][stage] > 0
     ]
-    n_log_n = 1 + math.log(math.log(last[size]) / math.log(first[size])) / decades
+    n_log_n = 1 + math.log(math.log(last[size]) / math.log(first[size])) / span
     print(f"\nExponents over {size}: {', '.join(told)}; N log N has {n_log_n:.2f}", flush=True)
 
 

@@ -54,6 +54,8 @@ def test_parted_cells_are_cut_and_no_other():
         fine = finer_where_parted(scene, kernel, grid, coarse, 10000, 0)
         assert len(fine) == len(coarse) + 15 * count
         assert fine.areas.sum() == pytest.approx(coarse.areas.sum())
+        # among small parts of small cells, too
+        assert is_parted(scene, kernel, fine, 0).any()
         assert len(finer_where_parted(scene, kernel, grid, coarse, 1, 0)) == len(coarse)
 
 
