@@ -246,7 +246,7 @@ typedef struct pl_solution {
  *   radiosity  3 * receiver_count: reflected radiosity
  *   reach      rays that hit from nearer [m] do not take a texel's light, which may lie half under something, but go on
  *
- * Backs have no texels: with these given, a receiver's ray that hits one first does not take the patch's mean, but goes on.
+ * Backs have no texels: with these given, a receiver's ray that hits one first does not take its mean, but goes on.
  */
 typedef struct pl_texel_light {
     const float *uvs;
