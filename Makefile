@@ -5,6 +5,7 @@
 # make bench  speed against error on exact scenes, quick settings: a table, and JSON and plots in out/bench
 # make bench-cycles SCENE=S.blend REFERENCE=S.npz  seconds and error beside Cycles' own bake of the same texels
 # make bench-rays SCENE=S.blend  our kernels' rays per second against a bare loop over the same rays
+# make bench-size  time and memory of bakes against triangles, texels and threads; half an hour
 # make check  linters, formatters, C tests under sanitizers
 # make zip    the Blender extension, one zip per platform, validated
 # make clean  remove what these made (.venv stays; `make distclean` removes it too)
@@ -25,7 +26,7 @@ WARNINGS := -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Werror
 SANITIZE := -std=c11 -O1 -g -ffp-contract=off -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
 C_TESTS := $(patsubst tests/native/%.c,$(BUILD)/native/%,$(wildcard tests/native/test_*.c))
 
-.PHONY: bake test bench bench-cycles bench-rays fuzz sanitize check lint native-tests kernel zip format clean distclean
+.PHONY: bake test bench bench-cycles bench-rays bench-size fuzz sanitize check lint native-tests kernel zip format clean distclean
 .DELETE_ON_ERROR:
 
 # ---- set-up: each stamp is newer than what it was made from ----
@@ -80,6 +81,9 @@ bench-cycles: kernel
 
 bench-rays: kernel
 	$(BIN)/python tests/bench/embree_rate.py $(SCENE)
+
+bench-size: kernel
+	$(BIN)/python tests/bench/size.py --out $(OUT)/bench $(SIZE_OPTIONS)
 
 # every example is new at each run; what fails is printed with how to repeat it
 EXAMPLES := 10000

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import denoiser
+from .denoiser import open_denoiser
 from .emitters import emitters_of
 from .gather import Irradiance, gather_irradiance
 from .kernel import KernelScene
@@ -60,7 +60,7 @@ def bake(
     progress = Progress(on_progress, STAGE_SHARES)
     with (
         Workers(settings.thread_count) as workers,
-        denoiser.opened(denoiser_library, settings, progress.poll) as (denoise, no_denoiser),
+        open_denoiser(denoiser_library, settings, progress.poll) as (denoise, no_denoiser),
     ):
         if settings.target == "lightmap":
             progress.begin("unwrap")
@@ -98,8 +98,8 @@ def bake(
             corner_colours[corner_means.triangles] = colours
             corner_colours = sound.spread(corner_colours)
         progress.end()
-        used = _denoiser_used(denoise, no_denoiser, irradiance)
-    report = replace(_report(scene, settings, progress, solved, irradiance, lightmap), denoiser=used)
+        denoiser = _denoiser_used(denoise, no_denoiser, irradiance)
+    report = _report(scene, settings, progress, solved, irradiance, lightmap, denoiser)
     return BakeResult(lightmap, corner_colours, report)
 
 
@@ -119,7 +119,7 @@ def _denoiser_used(denoise, reason, irradiance) -> str:
     return f"none: {reason or denoise.failure or 'no better than smoothing'}"
 
 
-def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap) -> Report:
+def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap, denoiser) -> Report:
     warnings = list(scene.warnings)
     if not irradiance.target_reached:
         warnings.append(
@@ -146,6 +146,7 @@ def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, l
         method=solved.method,
         solver=solved.solution.solver,
         choice=solved.choice,
+        denoiser=denoiser,
         residuals=solved.solution.residuals,
         estimated_error=irradiance.relative_error,
         seen_error=irradiance.seen_error,

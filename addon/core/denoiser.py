@@ -1,4 +1,4 @@
-"""Open Image Denoise by its C API, where its library is given: another estimate of gathered light, if a better one.
+"""Open Image Denoise by its C API, where its library is given: another estimate of the light on texels.
 
 Blender ships the library, built without the filter for lightmaps: the one for renderings serves, told that light has no
 upper bound. Which texels to believe it on is decided elsewhere, by what was measured there.
@@ -126,7 +126,7 @@ def _declared(library):
 
 
 @contextlib.contextmanager
-def opened(library: Path | None, settings: BakeSettings, poll: Callable[[], None]):
+def open_denoiser(library: Path | None, settings: BakeSettings, poll: Callable[[], None]):
     """The denoiser of a bake, and why there is none: (Denoiser, "") or (None, reason)."""
     if settings.target != "lightmap" or not settings.denoise:
         yield None, "not asked for" if settings.target == "lightmap" else "vertex colours are no image"

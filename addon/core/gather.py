@@ -201,10 +201,8 @@ def _measure(job: _Job, error, seed) -> Measured:
     pilot, spread, traced = _gathered(job, max(count // PILOT, 1), seed)
     quiet = np.sqrt(spread / PILOT) <= error * scale_of(direct + pilot.mean(axis=1))
     rays += traced
-    for part, share, own in (
-        (quiet, count, seed + 1),
-        (~quiet, max(min(MORE_RAYS * count, MOST_PROBE_RAYS), 2 * count), seed + 2),
-    ):
+    more = max(min(MORE_RAYS * count, MOST_PROBE_RAYS), 2 * count)
+    for part, share, own in ((quiet, count, seed + 1), (~quiet, more, seed + 2)):
         gathered, spread, traced = _gathered(job.part(np.flatnonzero(part)), share, own)
         values[part] += gathered.mean(axis=1)
         noise[part] += spread
@@ -283,9 +281,8 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
         if grid:
             job = _seeing(job, grid, direct, means)
         probes = probes or _measure(job.part(chosen), error, seed + 1)
-        smooth, relative, squares = _best_estimate(job, grid, means, direct, chosen, probes)
-        found = _Found(smooth, squares, False)
-        is_asked = error < rms_of(squares) <= DENOISE * error
+        found, relative = _best_estimate(job, grid, means, direct, chosen, probes)
+        is_asked = error < rms_of(found.squares) <= DENOISE * error
         if is_asked:
             found = _denoised(job, grid, found, means, direct, chosen, probes)
         squares = found.squares
@@ -332,7 +329,7 @@ def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:
 
 
 def _best_estimate(job, grid, means, direct, chosen, probes):
-    """Irradiance (N, 3), its relative noise (N,), the probes' squared relative errors, of replicate means (N, R, 3).
+    """What replicate means (N, R, 3) come to, a _Found, and its relative noise (N,).
 
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
     """
@@ -346,6 +343,6 @@ def _best_estimate(job, grid, means, direct, chosen, probes):
         values = (direct + gathered).astype(np.float32)
         scale = scale_of(values)
         squares = probes.squares_of(values[chosen], scale[chosen])
-        if best is None or rms_of(squares) < rms_of(best[2]):
-            best = values, np.sqrt(noise) / scale, squares
+        if best is None or rms_of(squares) < rms_of(best[0].squares):
+            best = _Found(values, squares, False), np.sqrt(noise) / scale
     return best

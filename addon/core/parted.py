@@ -43,12 +43,12 @@ def _blocked_sides(scene, kernel, patches, chosen, seed):
     return blocked
 
 
-def finer_where_parted(
-    scene: Scene, kernel: KernelScene, grid: Grid, patches: Patches, most: int, seed: int
-) -> Patches:
-    """Patches of a grid, one a cell, with those that are parted cut into smaller ones, ``most`` more in all."""
+def finer_where_parted(scene: Scene, kernel: KernelScene, grid: Grid, most: int, seed: int) -> Patches:
+    """Patches of a grid, one a cell; those that are parted are cut into smaller ones, ``most`` more in all."""
+    whole = np.ones(len(grid), np.int64)
+    patches = cut(scene, kernel, grid, whole, seed)
     parted = is_parted(scene, kernel, patches, seed).reshape(-1, 2).any(axis=1)
     for along in ALONG:
         if 0 < (along**2 - 1) * parted.sum() <= most:
-            return cut(scene, kernel, grid, np.where(parted, along, 1), seed)
+            return cut(scene, kernel, grid, np.where(parted, along, whole), seed)
     return patches

@@ -16,7 +16,7 @@ from .kernel import KernelScene
 from .parted import finer_where_parted
 from .patch_light import PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
-from .patches import cut, grid_of, patch_size_for
+from .patches import cut, grid_of, patch_size_for, subdivide
 from .progressive import solve_progressive
 from .scene import Scene, exitance_from_radiance
 from .settings import BakeSettings
@@ -73,14 +73,14 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
         precision = replace(settings, error=error)
         return solve_patches(kernel, lit.patches, emitted, solver, method, precision, on_step)
 
-    budget = patch_budget(solver, settings)
+    budget = _patch_budget(solver, settings)
     if settings.patch_size or solver == "stochastic":
         # where a patch costs rays only, as many of one size are as good in the same time
-        size = settings.patch_size or patch_size_for(scene, budget)
-        grid = grid_of(scene, size, budget)
-        patches = cut(scene, kernel, grid, np.ones(len(grid), np.int64), settings.seed)
-        if not settings.patch_size:
-            patches = finer_where_parted(scene, kernel, grid, patches, budget, settings.seed)
+        if settings.patch_size:
+            patches = subdivide(scene, kernel, settings.patch_size, budget, settings.seed)
+        else:
+            grid = grid_of(scene, patch_size_for(scene, budget), budget)
+            patches = finer_where_parted(scene, kernel, grid, budget, settings.seed)
         lit = measure(patches, lambda done: on_step(0.4 * done))
     else:
         lit = _decompose(scene, kernel, budget, settings, measure, solve, lambda done: on_step(0.4 * done))
@@ -101,7 +101,7 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     return Solved(field, emitters, sources, solution, method, choice, {"patches": lit.rays, "solve": solution.rays})
 
 
-def patch_budget(solver: str, settings: BakeSettings) -> int:
+def _patch_budget(solver: str, settings: BakeSettings) -> int:
     """How many patches, about, a solver is given."""
     budget = PATCH_BUDGETS[solver]
     if solver != "stochastic" or settings.patch_size:

@@ -35,7 +35,7 @@ class BakeSettings:
     keep_uvs : use the objects' existing "Lightmap" UV layers instead of unwrapping
     patch_size : longest edge of all patches [m]; None = chosen from the scene, and with solvers that need form factors
         the shorter, the more the light changes there
-    denoise : let Blender's denoiser improve gathered light in lightmaps where measured points say that it does
+    denoise : let Blender's denoiser improve lightmaps where measured points say that it does
     smooth_angle_deg : faces that meet at less share vertex colours, unless the edge is sharp
     seed : same seed, same bytes; denoised, on the same processor and Blender only
     threads : 0 = all cores

@@ -81,12 +81,5 @@ def _blocked(kernel, cells, step, receivers, spacing):
 
 def _widened(marks, axis):
     """Marks (H, W), with those up to SPREAD beside them along an axis."""
-    wide = marks.copy()
-    for step in range(1, SPREAD + 1):
-        low, high = np.delete(marks, np.s_[-step:], axis), np.delete(marks, np.s_[:step], axis)
-        pad = [(0, 0), (0, 0)]
-        pad[axis] = (step, 0)
-        wide |= np.pad(low, pad)
-        pad[axis] = (0, step)
-        wide |= np.pad(high, pad)
-    return wide
+    padded = np.pad(marks, [(SPREAD, SPREAD) if k == axis else (0, 0) for k in (0, 1)])
+    return np.lib.stride_tricks.sliding_window_view(padded, 2 * SPREAD + 1, axis).any(axis=-1)

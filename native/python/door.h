@@ -48,7 +48,16 @@ bool door_range_fits(uint64_t first, uint64_t count, uint64_t end);
 /* NULL with the exception that the status means; None for PL_OK. */
 PyObject *door_result(pl_status status);
 
-/* Functions with a file of their own: light.c. */
+/* Functions with a file of their own: patches.c ... */
+PyObject *door_create_patches(PyObject *self, PyObject *args);
+PyObject *door_patch_points(PyObject *self, PyObject *args);
+PyObject *door_sobol_points(PyObject *self, PyObject *args);
+PyObject *door_form_factors_monte_carlo(PyObject *self, PyObject *args);
+PyObject *door_form_factors_hemicube(PyObject *self, PyObject *args);
+PyObject *door_openness(PyObject *self, PyObject *args);
+PyObject *door_shoot(PyObject *self, PyObject *args);
+
+/* ... and light.c. */
 PyObject *door_learn_guides(PyObject *self, PyObject *args);
 PyObject *door_gather(PyObject *self, PyObject *args);
 PyObject *door_direct(PyObject *self, PyObject *args);

@@ -1,31 +1,19 @@
 /* Which of the triangles that meet at an edge a ray hits. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "scene.h"
 
-typedef struct dvec3 {
-    double x, y, z;
-} dvec3;
-
-static dvec3 between(vec3 from, vec3 to) {
-    return (dvec3){(double)to.x - (double)from.x, (double)to.y - (double)from.y, (double)to.z - (double)from.z};
-}
-
-static double dot(dvec3 a, dvec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-
-static dvec3 cross(dvec3 a, dvec3 b) {
-    return (dvec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-
 /* Distance to a triangle by double arithmetic (Moeller & Trumbore 1997, eq. 6); infinite where it is not met. */
 static double exact_distance(const pl_scene *scene, int32_t triangle, vec3 origin, vec3 direction) {
     const vec3 a = scene_vertex(scene, triangle, 0);
-    const dvec3 ab = between(a, scene_vertex(scene, triangle, 1)), ac = between(a, scene_vertex(scene, triangle, 2));
-    const dvec3 from_a = between(a, origin);
+    const dvec3 ab = dvec3_between(a, scene_vertex(scene, triangle, 1)),
+                ac = dvec3_between(a, scene_vertex(scene, triangle, 2));
+    const dvec3 from_a = dvec3_between(a, origin);
     /* turned by some 1e-12, or a ray through the edge itself would meet all that meet there */
     const double turn = 1e-12 * (double)vec3_length(direction);
     const dvec3 along = {direction.x + 0.41 * turn, direction.y + 0.73 * turn, direction.z + 0.59 * turn};
-    const dvec3 p = cross(along, ac), q = cross(from_a, ab);
-    const double volume = dot(p, ab);
-    const double u = dot(p, from_a) / volume, v = dot(q, along) / volume, distance = dot(q, ac) / volume;
+    const dvec3 p = dvec3_cross(along, ac), q = dvec3_cross(from_a, ab);
+    const double volume = dvec3_dot(p, ab);
+    const double u = dvec3_dot(p, from_a) / volume, v = dvec3_dot(q, along) / volume,
+                 distance = dvec3_dot(q, ac) / volume;
     return u >= 0 && v >= 0 && u + v <= 1 ? distance : INFINITY;
 }
 

@@ -87,13 +87,6 @@ static const float *texel_hit(const pl_texel_light *texels, const pl_hit *hit, b
     return receiver < 0 || (size_t)receiver >= texels->receiver_count ? NULL : texels->radiosity + 3 * (size_t)receiver;
 }
 
-static bool is_far(const gather_job *job, const pl_hit *hit, size_t side) {
-    return hit->distance >= job->solution->reaches[side];
-}
-static bool take_patch(const gather_job *job, const pl_hit *hit, size_t side, bool is_last) {
-    return is_last || (is_far(job, hit, side) && job->solution->kinds[side] != PL_SIDE_MIXED);
-}
-
 /* Add what one ray sees to the sum. */
 static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 direction, ray_random random,
                        float *io_sum) {
@@ -125,7 +118,8 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             return;
         /* patches let a little light through walls that part them: backs, which no texel has, are not to pass it on */
         const bool goes_on = step == 0 && is_back && job->texels;
-        if (seen ? takes_texel : !goes_on && take_patch(job, &hit, side, is_last)) {
+        const bool is_far = !seen && !goes_on && hit.distance >= solution->reaches[side];
+        if (seen ? takes_texel : is_last || (is_far && solution->kinds[side] != PL_SIDE_MIXED)) {
             add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
             return;
         }
@@ -133,7 +127,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             sample_direct(job, &hit, side, &random, weight, io_sum);
         else
             add(io_sum, solution->direct + 3 * side, weight);
-        if (!seen && !goes_on && is_far(job, &hit, side)) {
+        if (is_far) {
             for (size_t k = 3 * side; k < 3 * side + 3; ++k)
                 io_sum[k - 3 * side] += weight[k - 3 * side] * (solution->radiosity[k] - solution->direct[k]);
             return;

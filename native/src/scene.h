@@ -69,8 +69,9 @@ pl_hit closest_hit(const pl_scene *scene, vec3 origin, vec3 direction, float nea
 pl_hit opaque_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near);
 
 /* edge_hits.c: of a hit that opaque_hit found at an edge, the one that double finds: else, once in 10^8 rays, a wall as
- * thin as nothing leaks into the room behind where it stands on a floor that both rooms share. */
+ * thin as nothing leaks into the room behind it, where the floors of both rooms end at its foot. */
 pl_hit hit_at_edge(const pl_scene *scene, vec3 origin, vec3 direction, float near, pl_hit hit);
+
 /* Opaque triangles strictly between origin and origin + direction. */
 bool is_occluded(const pl_scene *scene, vec3 origin, vec3 direction, float far);
 /* Multiply io_rgb by what the transmitting triangles up to `far` let through. */

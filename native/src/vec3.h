@@ -25,6 +25,18 @@ static inline vec3 vec3_unit(vec3 a) {
     return length > 0 ? vec3_scale(a, 1 / length) : a;
 }
 
+typedef struct dvec3 {
+    double x, y, z;
+} dvec3;
+
+static inline dvec3 dvec3_between(vec3 from, vec3 to) {
+    return (dvec3){(double)to.x - (double)from.x, (double)to.y - (double)from.y, (double)to.z - (double)from.z};
+}
+static inline double dvec3_dot(dvec3 a, dvec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+static inline dvec3 dvec3_cross(dvec3 a, dvec3 b) {
+    return (dvec3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
 /* Two unit vectors that complete n, without a branch at the pole (Duff et al. 2017). */
 static inline void vec3_basis(vec3 n, vec3 *out_u, vec3 *out_v) {
     const float sign = copysignf(1.0f, n.z);

@@ -28,7 +28,7 @@ from patchlight.core.receivers import surface_receivers
 from patchlight.core.settings import BakeSettings
 from patchlight.core.smoothing import texel_grid
 from patchlight.core.sound_faces import sound_faces
-from patchlight.core.texel_light import TexelLight
+from patchlight.core.texel_light import TexelLight, split_where_blocked
 from patchlight.core.texels import texels
 from patchlight.core.unwrap import unwrap
 from patchlight.core.workers import Workers
@@ -86,9 +86,11 @@ def kernels(scene, settings, workers, count):
     everywhere = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
     grid = texel_grid(scene, charts, texel_map, everywhere)
     # how much light there is on the texels makes no difference to the time
-    light = TexelLight(grid.uvs, grid.receivers, np.ones((len(texel_map), 3), np.float32), NEAR * grid.spacing)
+    ones = np.ones((len(texel_map), 3), np.float32)
     receivers = everywhere.part(np.unique(np.linspace(0, len(texel_map) - 1, min(count, len(texel_map))).astype(int)))
     kernel = kernel_module.KernelScene(scene, workers)
+    cells = split_where_blocked(kernel, grid.receivers, everywhere, grid.spacing)
+    light = TexelLight(grid.uvs, cells, ones, NEAR * grid.spacing)
     solved = solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), settings, lambda done: None)
     guides, _ = learn_guides(kernel, solved.patches, light, solved.sources, receivers, 3)
     everyone = np.arange(len(receivers), dtype=np.uint32)

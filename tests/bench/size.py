@@ -1,6 +1,6 @@
 """How time and memory grow: bakes of a grid of furnished rooms against triangles, texels, objects and threads.
 
-    python tests/bench/size.py [--quick] [--error E] [--out DIR]
+    make bench-size SIZE_OPTIONS="[--quick] [--error E]"
 
 Each bake runs in a process of its own, without a denoiser. Under each table stands the exponent of every stage that
 takes a second or more, from the smallest to the largest bake, beside that of N log N. ``--quick``: not the largest.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from addon.core.bake import bake
-from addon.core.denoiser import Denoiser, DenoiserError, opened
+from addon.core.denoiser import Denoiser, DenoiserError, open_denoiser
 from addon.core.denoising import denoised, mixed
 from addon.core.probes import Measured
 from addon.core.settings import BakeCancelled, BakeSettings
@@ -70,7 +70,7 @@ def test_what_is_no_library_is_told_and_stops_nothing(tmp_path):
     ],
 )
 def test_why_there_is_none(settings, library, why):
-    with opened(library, settings, lambda: None) as (denoise, reason):
+    with open_denoiser(library, settings, lambda: None) as (denoise, reason):
         assert denoise is None
         assert why in reason
 

@@ -21,21 +21,26 @@ def floor_with_wall():
     return scene_of([floor, rectangle((WALL, 0, 0), (0, 1, 0), (0, 0, 1), name="wall")])
 
 
+def spans(scene, kernel, patches):
+    """Least and largest x of 64 points of each patch: a hundredth or two of a 0.1 m patch is left at its border."""
+    _, barycentrics = kernel.patch_points(np.arange(len(patches)), 64, 1)
+    corners = scene.corners[np.repeat(patches.triangles, 64)]
+    x = np.einsum("nk,nkc->nc", barycentrics, corners)[:, 0].reshape(len(patches), 64)
+    return x.min(axis=1), x.max(axis=1)
+
+
 def test_patches_under_a_wall_are_parted_on_its_side_only():
     scene = floor_with_wall()
     with kernel_of(scene) as kernel:
         patches = subdivide(scene, kernel, 0.1, 10000, 0)
         parted = is_parted(scene, kernel, patches, 0).reshape(-1, 2)
-        _, barycentrics = kernel.patch_points(np.arange(len(patches)), 64, 1)
-    corners = scene.corners[np.repeat(patches.triangles, 64)]
-    x = np.einsum("nk,nkc->nc", barycentrics, corners)[:, 0].reshape(len(patches), 64)
+        low, high = spans(scene, kernel, patches)
     on_floor = patches.triangles < 2
-    crosses = (x.min(axis=1) < WALL - 0.03) & (x.max(axis=1) > WALL + 0.03)
+    crosses = (low < WALL - 0.03) & (high > WALL + 0.03)
     assert crosses[on_floor].any()
     assert parted[on_floor & crosses, 0].all()
     assert not parted[on_floor, 1].any()
-    # 64 points leave a hundredth or two of a patch's border
-    assert not parted[on_floor & ((x.max(axis=1) < WALL - 0.03) | (x.min(axis=1) > WALL + 0.03)), 0].any()
+    assert not parted[on_floor & ((high < WALL - 0.03) | (low > WALL + 0.03)), 0].any()
 
 
 @pytest.mark.parametrize("scene", [closed_box(), scene_of([box((0, 0, 0), (1, 1, 1))])], ids=["room", "block"])
@@ -51,12 +56,15 @@ def test_parted_cells_are_cut_and_no_other():
         grid = grid_of(scene, 0.1, 10000)
         coarse = subdivide(scene, kernel, 0.1, 10000, 0)
         count = is_parted(scene, kernel, coarse, 0).reshape(-1, 2).any(axis=1).sum()
-        fine = finer_where_parted(scene, kernel, grid, coarse, 10000, 0)
+        fine = finer_where_parted(scene, kernel, grid, 10000, 0)
         assert len(fine) == len(coarse) + 15 * count
         assert fine.areas.sum() == pytest.approx(coarse.areas.sum())
-        # among small parts of small cells, too
-        assert is_parted(scene, kernel, fine, 0).any()
-        assert len(finer_where_parted(scene, kernel, grid, coarse, 1, 0)) == len(coarse)
+        # parts of cells are asked again, however small: those that cross it by a third of their 0.025 m
+        low, high = spans(scene, kernel, fine)
+        crosses = (fine.triangles < 2) & (low < WALL - 0.008) & (high > WALL + 0.008)
+        assert crosses.any()
+        assert is_parted(scene, kernel, fine, 0)[::2][crosses].all()
+        assert len(finer_where_parted(scene, kernel, grid, 1, 0)) == len(coarse)
 
 
 def test_texels_beside_a_wall_are_split_and_no_other():

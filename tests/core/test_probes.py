@@ -78,3 +78,12 @@ def test_the_error_of_probes_takes_out_what_they_do_not_know():
 def test_the_scale_of_an_error_is_the_light_and_a_share_of_the_median():
     light = np.repeat(np.array([[0.0], [1.0], [2.0], [3.0]]), 3, axis=1)
     assert scale_of(light) == pytest.approx([0.6, 1.6, 2.6, 3.6])
+
+
+def test_probes_that_know_too_little_do_not_say_that_there_is_no_error():
+    """Squares about 0 by their noise alone: what their mean may be off by is stated, not 0."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        squares = rng.normal(0, 1, 400)
+        assert rms_of(squares) >= (squares.std() / 20) ** 0.5 > 0
+    assert rms_of(np.zeros(400)) == 0
