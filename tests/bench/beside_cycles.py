@@ -3,7 +3,7 @@
     python tests/bench/beside_cycles.py S.blend S.npz --out DIR [--errors 0.1 0.05] [--samples 4 16] [--as-it-is]
 
 Cycles bakes with all objects joined into one mesh, its best case: as they are it starts anew for each object, which
-``--as-it-is`` measures too. Only its bake operator is timed; ours is the report's ``seconds.bake``, with unwrapping.
+``--as-it-is`` measures too. Only its bake operator is timed; ours is the report's ``seconds.bake``: neither unwraps.
 Where pyoidn is installed, each joined bake is denoised, too (Open Image Denoise, filter RTLightmap), its time added.
 """
 
