@@ -79,6 +79,20 @@ PyObject *door_sobol_points(PyObject *self, PyObject *args) {
     Py_RETURN_NONE;
 }
 
+/* What every form factor estimator takes: the sides that it is for, and their rows. */
+#define SIDES_AND_ROWS                                                                                                 \
+    {"sides", 'i', 1, -1, false, {0}}, { "out_rows", 'd', 1, -1, true, {0} }
+
+/* Fill SIDES_AND_ROWS; false with an exception, and nothing held, where the rows are not as long as there are sides. */
+static bool rows_are_open(const pl_patches *patches, PyObject *const *objects, door_array *arrays) {
+    if (!patches || !door_arrays(objects, arrays, 2))
+        return false;
+    if (door_has_numbers(&arrays[1], door_rows(&arrays[0]) * 2 * pl_patches_count(patches)))
+        return true;
+    door_release(arrays, 2);
+    return false;
+}
+
 PyObject *door_form_factors_monte_carlo(PyObject *self, PyObject *args) {
     PyObject *capsules[2], *objects[2];
     unsigned rays, seed;
@@ -88,14 +102,9 @@ PyObject *door_form_factors_monte_carlo(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = door_patches(scene, capsules[1]);
-    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
-    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'd', 1, -1, true, {0}}};
-    if (!patches || !door_arrays(objects, arrays, 2))
+    door_array arrays[] = {SIDES_AND_ROWS};
+    if (!rows_are_open(patches, objects, arrays))
         return NULL;
-    if (!door_has_numbers(&arrays[1], door_rows(&arrays[0]) * (size_t)sides)) {
-        door_release(arrays, 2);
-        return NULL;
-    }
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_form_factors_monte_carlo(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]), rays, seed,
@@ -116,14 +125,9 @@ PyObject *door_form_factors_hemicube(PyObject *self, PyObject *args) {
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = door_patches(scene, capsules[1]);
-    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
-    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}}, {"out_rows", 'd', 1, -1, true, {0}}};
-    if (!patches || !door_arrays(objects, arrays, 2))
+    door_array arrays[] = {SIDES_AND_ROWS};
+    if (!rows_are_open(patches, objects, arrays))
         return NULL;
-    if (!door_has_numbers(&arrays[1], door_rows(&arrays[0]) * (size_t)sides)) {
-        door_release(arrays, 2);
-        return NULL;
-    }
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_form_factors_hemicube(scene, patches, arrays[0].view.buf, door_rows(&arrays[0]), resolution, positions,
