@@ -33,7 +33,7 @@ MOST_COST = 15  # times the rays of the first pass that all passes may take, and
 FREE_RAYS = 1 << 26
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
-AIM = 0.9  # of the target: what receivers are due is an estimate
+AIM = 0.95  # of the target: what receivers are due is an estimate
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
 SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
 MOST_EXTRA = 2  # passes after that, each with four times the rays: speckles are gone by then
@@ -281,7 +281,7 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
         if grid:
             job = _seeing(job, grid, direct, means)
         probes = probes or _measure(job.part(chosen), error, seed + 1)
-        found, relative = _best_estimate(job, grid, means, direct, chosen, probes)
+        found, relative = _best_estimate(job, grid, means, taken, direct, chosen, probes)
         is_asked = error < rms_of(found.squares) <= DENOISE * error
         if is_asked:
             found = _denoised(job, grid, found, means, direct, chosen, probes)
@@ -297,7 +297,7 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
             return ended("as further rays no longer help")
         errors = measured_errors(relative, chosen, squares)
         extra += rms <= error
-        speckled = np.where(errors > SPECKLE * error, np.inf, 0.0)
+        speckled = np.where(relative > SPECKLE * error, np.inf, 0.0)
         due = rays_due(errors, taken, AIM * error) if rms > error else speckled
         in_time = seconds_left() * rays / (time.perf_counter() - started)
         cost = rays / int(taken.sum())  # of one more ray of all replicates, with those that it goes on as
@@ -328,16 +328,15 @@ def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:
     return rays
 
 
-def _best_estimate(job, grid, means, direct, chosen, probes):
+def _best_estimate(job, grid, means, taken, direct, chosen, probes):
     """What replicate means (N, R, 3) come to, a _Found, and its relative noise (N,).
 
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
     """
     variance = (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES
-    pooled = np.convolve(variance, np.full(POOL, 1 / POOL), "same") if len(variance) >= POOL else variance
-    estimates = [(means.mean(axis=1), pooled)]
+    estimates = [(means.mean(axis=1), _pooled(variance * taken) / taken)]
     if grid is not None:
-        estimates.append(smoothed(job.kernel.workers, grid, job.receivers, means))
+        estimates.append(smoothed(job.kernel.workers, grid, job.receivers, means, taken))
     best = None
     for gathered, noise in estimates:
         values = (direct + gathered).astype(np.float32)
@@ -346,3 +345,10 @@ def _best_estimate(job, grid, means, direct, chosen, probes):
         if best is None or rms_of(squares) < rms_of(best[0].squares):
             best = _Found(values, squares, False), np.sqrt(noise) / scale
     return best
+
+
+def _pooled(of_one_ray):
+    """Variances (N,) of one ray at each receiver, averaged over its neighbours."""
+    if len(of_one_ray) < POOL:
+        return of_one_ray
+    return np.convolve(of_one_ray, np.full(POOL, 1 / POOL), "same")

@@ -61,17 +61,20 @@ def blurred(workers: Workers, grid: TexelGrid, receivers: Receivers, means):
     return smooth(workers, grid, receivers, values, np.zeros(len(values), np.float32), 1, False)[0]
 
 
-def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means):
-    """Replicate means (N, R, 3) of gathered light, smoothed: values float32 (N, 3), variance of luminance (N,)."""
+def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means, taken):
+    """Replicate means (N, R, 3) of gathered light, smoothed: values float32 (N, 3), variance of luminance (N,).
+
+    ``taken`` (N,) is how many rays each mean is of.
+    """
     values = means.mean(axis=1, dtype=np.float32)
     variances = (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]
     variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
-    # a few replicates alone say little of one texel's noise: pool them over the neighbours, relative to the light
-    # there, as the noise of what is bright says nothing of the calm beside it
+    # a few replicates alone say little of one texel's noise: pool what one ray has of it over the neighbours, relative
+    # to the light there, as the noise of what is bright says nothing of the calm beside it
     scales = scale_of(smooth(workers, grid, receivers, values, variances, 1, False)[0])
-    relative = np.minimum(variances / scales**2, LARGEST_VARIANCE).astype(np.float32)
-    pooled, _ = smooth(workers, grid, receivers, np.repeat(relative[:, None], 3, axis=1), variances, 1, False)
-    noise = np.minimum(pooled[:, 0] * scales**2, LARGEST_VARIANCE).astype(np.float32)
+    of_one_ray = np.minimum(variances / scales**2 * taken, LARGEST_VARIANCE).astype(np.float32)
+    pooled, _ = smooth(workers, grid, receivers, np.repeat(of_one_ray[:, None], 3, axis=1), variances, 1, False)
+    noise = np.minimum(pooled[:, 0] / taken * scales**2, LARGEST_VARIANCE).astype(np.float32)
     for step in STEPS:
         values, noise = smooth(workers, grid, receivers, values, noise, step, True)
     return values, noise

@@ -31,9 +31,9 @@ def noisy(light, deviation, seed=1):
     return np.repeat(values[..., None], 3, axis=2).astype(np.float32)
 
 
-def run(grid, receivers, means):
+def run(grid, receivers, means, taken=1):
     with Workers(2) as workers:
-        return smoothed(workers, grid, receivers, means)
+        return smoothed(workers, grid, receivers, means, np.broadcast_to(taken, len(means)))
 
 
 @pytest.mark.parametrize("step", [1, 4])
@@ -78,6 +78,17 @@ def test_noise_falls_by_what_so_many_texels_are_worth():
     assert found < deviation / 7.5
     # what is stated takes neighbours for independent after every level, which they are not: probes tell how much more
     assert 0 < np.sqrt(variances[inner].mean()) < found
+
+
+def test_a_texel_of_many_rays_is_not_taken_for_as_noisy_as_its_neighbours():
+    """Else texels in a corner, whose neighbours few rays reach, get ever more rays, whatever they found."""
+    grid, receivers = wall(3)
+    means, taken = noisy(np.ones(9), 3.0), np.ones(9)
+    means[4], taken[4] = noisy(np.ones(1), 0.03, 2), 10**4
+    _, alike = run(grid, receivers, means)
+    _, variances = run(grid, receivers, means, taken)
+    # its variance is 2e-4, a neighbour's 2: one that has its value by chance may still add some
+    assert variances[4] < 0.05 * alike[4]
 
 
 def test_a_step_above_the_noise_stays_and_one_below_may_go():
