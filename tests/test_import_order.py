@@ -21,7 +21,7 @@ CORE_ORDER = (
     *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides"),
     *("patch_solution", "patch_light", "decomposition", "choose", "radiosity"),
     *("charts", "cut", "flatten", "packing", "unwrap", "texels", "gaps", "smoothing", "probes"),
-    *("denoiser", "denoising", "allocation", "gather", "lightmap", "bake"),
+    *("denoiser", "denoising", "allocation", "direct_light", "gather", "lightmap", "bake"),
     *("peak_memory", "bench_row", "bench_cube", "bench_scenes", "bench_peers", "bench_factors", "bench_light", "bench"),
     "bench_plot",
 )

@@ -10,6 +10,7 @@ import numpy as np
 
 from .allocation import measured_errors, next_pass, rays_due
 from .denoising import denoised
+from .direct_light import first_direct, refined_direct, shadow_samples
 from .emitters import LUMINANCE
 from .guides import Guides, learn_guides, no_guides
 from .kernel import KernelScene
@@ -17,7 +18,7 @@ from .probes import Measured, SeenPoints, chosen_receivers, rms_of
 from .radiosity import Solved
 from .receivers import Receivers
 from .relative import scale_of
-from .smoothing import TexelGrid, blurred, smoothed
+from .smoothing import TexelGrid, blurred, pooled, smoothed
 from .texel_light import NO_TEXEL_LIGHT, TexelLight, split_where_blocked
 
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
@@ -35,17 +36,14 @@ WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE 
 MOST_IDLE = 2  # the noise
 AIM = 0.95  # of the target: what receivers are due is an estimate
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
-SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
+SPECKLE = 3.0  # times the target: what is left, when it is met, is seen
 MOST_EXTRA = 2  # passes after that, each with four times the rays: speckles are gone by then
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
-DIRECT_PASSES = 2  # each with four times the shadow rays of the one before, for the receivers that need it
-DIRECT_SHARE = 0.5  # of the error that direct light may have
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
 PILOT = 4  # of a probe's rays, one in so many tells whether it needs more
 MORE_RAYS, MOST_PROBE_RAYS = 16, 1024  # times as many, but not more, for probes more uncertain than the error aimed at
 FURTHER = 2.0  # seen points look so many times further before they take a texel's or a patch's light for what is there
-POOL = 5  # neighbouring receivers whose variances are averaged: four replicates alone say little of one receiver
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +68,6 @@ class Irradiance:
     stopped: str
     is_denoised: bool
     rays: dict[str, int]
-
-
-def shadow_samples(error: float) -> int:
-    """Shadow rays of a receiver in penumbra: stratified, so that their error falls nearly as 1 / rays."""
-    return int(min(max(2 ** round(np.log2(3.2 / error)), 16), 2048))
 
 
 def probe_rays(error: float) -> int:
@@ -150,18 +143,17 @@ def gather_irradiance(
         nothing = {"direct": 0, "gather": 0, "probe": 0}
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
     job = _Job(kernel, solved, receivers, no_guides(len(receivers)), denoise=denoise if grid else None)
-    direct, shadow_rays = _direct_until(job, error, seed, lambda done: on_step(0.25 * done))
-    looks = 0
+    direct, look, looks = _first_look(job, grid, error, seed, on_step)
     if grid is not None:
-        job, looks = _with_first_look(job, grid, direct, seed + 2, lambda done: on_step(0.25 + 0.15 * done))
+        job = _with_texel_light(job, grid, direct.values, look)
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
-    gathered = _gather_until(replace(job, guides=guides), grid, direct, error, seed, seconds_left, on_step)
+    gathered = _gather_until(replace(job, guides=guides), grid, direct.values, error, seed, seconds_left, on_step)
     of_points = replace(gathered.job, receivers=seen.receivers, guides=no_guides(len(seen.receivers)))
     at_points = _measure(of_points.looking_further(FURTHER), error, seed + 5)
     shown = seen.look_up(gathered.values)
     seen_error = rms_of(at_points.squares_of(shown, scale_of(shown)))
     traced = {
-        "direct": shadow_rays,
+        "direct": direct.rays,
         "gather": looks + learning + gathered.rays,
         "probe": gathered.probe_rays + at_points.rays,
     }
@@ -169,24 +161,37 @@ def gather_irradiance(
     return Irradiance(gathered.values, gathered.rms, seen_error, is_met, gathered.stopped, gathered.is_denoised, traced)
 
 
-def _with_first_look(job: _Job, grid: TexelGrid, direct, seed, on_step):
-    """The job whose rays see what a first look found on the texels, and the rays of that look."""
-    sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
-    rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, LOOK_RAYS, seed, sums, on_step)
-    reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
-    no_light = np.zeros((len(sums), 3), np.float32)
-    cells = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
-    job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, cells, no_light, reach))
-    return _seeing(job, grid, direct, sums / LOOK_RAYS), rays
+def _first_look(job: _Job, grid: TexelGrid | None, error, seed, on_step):
+    """Direct light, what a few gather rays find (N, 3), and how many these were.
 
-
-def _seeing(job: _Job, grid: TexelGrid, direct, means) -> _Job:
-    """The job whose rays see what replicate means (N, R, 3) have found on the texels.
-
-    Blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while smoothing
-    that minds values would take some of a few rays' light away.
+    Direct light comes in two parts, as how much noise it may have depends on what else there is.
     """
-    gathered = blurred(job.kernel.workers, grid, job.receivers, means)
+
+    def trace(done, width):
+        return lambda chosen, *asked: job.part(chosen).direct(*asked, lambda part: on_step(done + width * part))
+
+    first = first_direct(trace(0.0, 0.1), len(job.receivers), error, seed)
+    means, _, rays = _gathered(job, LOOK_RAYS, seed + 2, lambda done: on_step(0.1 + 0.1 * done))
+    look = means.mean(axis=1) if grid is None else blurred(job.kernel.workers, grid, job.receivers, means)
+    scale = scale_of(first.values + look)
+
+    def over_neighbours(of_one_ray):
+        return pooled(job.kernel.workers, grid, job.receivers, of_one_ray)
+
+    return refined_direct(first, trace(0.2, 0.2), over_neighbours, scale, error, seed), look, rays
+
+
+def _with_texel_light(job: _Job, grid: TexelGrid, direct, look):
+    """The job whose rays see what a first look found on the texels."""
+    reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
+    cells = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
+    no_light = np.zeros((len(direct), 3), np.float32)
+    job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, cells, no_light, reach))
+    return _seeing(job, grid, direct, look)
+
+
+def _seeing(job: _Job, grid: TexelGrid, direct, gathered) -> _Job:
+    """The job whose rays see direct and gathered light (N, 3) on the texels."""
     radiosity = (grid.reflectance * (direct + gathered)).astype(np.float32)
     return replace(job, texel_light=replace(job.texel_light, radiosity=radiosity))
 
@@ -210,27 +215,12 @@ def _measure(job: _Job, error, seed) -> Measured:
     return Measured(values @ LUMINANCE, noise, rays)
 
 
-def _gathered(job: _Job, count, seed):
+def _gathered(job: _Job, count, seed, on_step=None):
     """Means of ``count`` rays of each replicate (N, R, 3), variance of their mean's luminance (N,), the rays."""
     sums = np.zeros((len(job.receivers), REPLICATES, 3), np.float32)
-    rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, count, seed, sums)
+    rays = job.gather(np.arange(len(sums), dtype=np.uint32), 0, count, seed, sums, on_step)
     means = sums / count
     return means, (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES, rays
-
-
-def _direct_until(job: _Job, error, seed, on_step):
-    """Direct irradiance (N, 3), with more rays where an estimate is too noisy, and the rays."""
-    samples = shadow_samples(error)
-    direct, variance, rays = job.direct(samples, seed, on_step)
-    for attempt in range(1, DIRECT_PASSES):
-        noisy = np.flatnonzero(np.sqrt(variance) > DIRECT_SHARE * error * scale_of(direct))
-        if not len(noisy):
-            break
-        samples *= 4
-        again = job.part(noisy).direct(samples, seed + 1000 * attempt)
-        direct[noisy], variance[noisy] = again[:2]
-        rays += again[2]
-    return direct, rays
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,7 +269,9 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
         budget = budget or int(max(MOST_COST * rays, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
         means, before = sums / taken[:, None, None].astype(np.float32), rms
         if grid:
-            job = _seeing(job, grid, direct, means)
+            # blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while
+            # smoothing that minds values would take some of a few rays' light away
+            job = _seeing(job, grid, direct, blurred(job.kernel.workers, grid, job.receivers, means))
         probes = probes or _measure(job.part(chosen), error, seed + 1)
         found, relative = _best_estimate(job, grid, means, taken, direct, chosen, probes)
         is_asked = error < rms_of(found.squares) <= DENOISE * error
@@ -334,7 +326,7 @@ def _best_estimate(job, grid, means, taken, direct, chosen, probes):
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
     """
     variance = (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES
-    estimates = [(means.mean(axis=1), _pooled(variance * taken) / taken)]
+    estimates = [(means.mean(axis=1), pooled(job.kernel.workers, None, job.receivers, variance * taken) / taken)]
     if grid is not None:
         estimates.append(smoothed(job.kernel.workers, grid, job.receivers, means, taken))
     best = None
@@ -345,10 +337,3 @@ def _best_estimate(job, grid, means, taken, direct, chosen, probes):
         if best is None or rms_of(squares) < rms_of(best[0].squares):
             best = _Found(values, squares, False), np.sqrt(noise) / scale
     return best
-
-
-def _pooled(of_one_ray):
-    """Variances (N,) of one ray at each receiver, averaged over its neighbours."""
-    if len(of_one_ray) < POOL:
-        return of_one_ray
-    return np.convolve(of_one_ray, np.full(POOL, 1 / POOL), "same")

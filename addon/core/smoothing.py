@@ -22,6 +22,7 @@ from .workers import Workers
 
 LARGEST_VARIANCE = 1e34  # whatever shines: the sum of some remains a float32
 STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
+POOL = 5  # receivers in a row that are neighbours, where there is no grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +62,17 @@ def blurred(workers: Workers, grid: TexelGrid, receivers: Receivers, means):
     return smooth(workers, grid, receivers, values, np.zeros(len(values), np.float32), 1, False)[0]
 
 
+def pooled(workers: Workers, grid: TexelGrid | None, receivers: Receivers, of_one_ray):
+    """Relative variances (N,) of one ray, averaged over the nearest receivers of the same surface: (N,).
+
+    A few replicates alone say little of one receiver's noise.
+    """
+    if grid is None:
+        return of_one_ray if len(of_one_ray) < POOL else np.convolve(of_one_ray, np.full(POOL, 1 / POOL), "same")
+    of_one_ray = np.minimum(of_one_ray, LARGEST_VARIANCE).astype(np.float32)
+    return smooth(workers, grid, receivers, np.repeat(of_one_ray[:, None], 3, axis=1), of_one_ray, 1, False)[0][:, 0]
+
+
 def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means, taken):
     """Replicate means (N, R, 3) of gathered light, smoothed: values float32 (N, 3), variance of luminance (N,).
 
@@ -69,12 +81,10 @@ def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means, tak
     values = means.mean(axis=1, dtype=np.float32)
     variances = (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]
     variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
-    # a few replicates alone say little of one texel's noise: pool what one ray has of it over the neighbours, relative
-    # to the light there, as the noise of what is bright says nothing of the calm beside it
+    # relative to the light there, as the noise of what is bright says nothing of the calm beside it
     scales = scale_of(smooth(workers, grid, receivers, values, variances, 1, False)[0])
-    of_one_ray = np.minimum(variances / scales**2 * taken, LARGEST_VARIANCE).astype(np.float32)
-    pooled, _ = smooth(workers, grid, receivers, np.repeat(of_one_ray[:, None], 3, axis=1), variances, 1, False)
-    noise = np.minimum(pooled[:, 0] / taken * scales**2, LARGEST_VARIANCE).astype(np.float32)
+    relative = pooled(workers, grid, receivers, variances / scales**2 * taken) / taken
+    noise = np.minimum(relative * scales**2, LARGEST_VARIANCE).astype(np.float32)
     for step in STEPS:
         values, noise = smooth(workers, grid, receivers, values, noise, step, True)
     return values, noise

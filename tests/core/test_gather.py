@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from addon.core.direct_light import shadow_samples
 from addon.core.emitters import LUMINANCE
-from addon.core.gather import shadow_samples
 from addon.core.receivers import surface_receivers
 from addon.core.scene import AreaLight
 from tests.physics.lighting import full_light

@@ -65,7 +65,7 @@ def test_any_mesh_bakes_to_light_or_is_refused_by_name(scene, asked):
     result, refusal = bake_or_refusal(scene, affordable(scene, asked))
     event("refused" if refusal else "baked")
     if refusal:
-        assert refusal.split()[0] in {"nothing", "object", "density", "texels"}
+        assert refusal.split()[0] in {"nothing", "object", "density", "texels", "solver"}
     else:
         require_light(scene, result)
         require_named(scene, result.report)

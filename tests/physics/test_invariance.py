@@ -65,8 +65,8 @@ def test_a_hundred_kilometres_from_the_origin_the_light_is_the_same(seeds):
 @pytest.mark.parametrize("seed", range(3))
 def test_a_turned_scene_gives_the_same_light(seeds, seed):
     values, _ = colours(moved(room(), random_rotation(np.random.default_rng(seed)), offset=(1e3, 0, 5)), 1)
-    # other directions, so other samples: three seeds' largest difference and half as much again
-    assert relative_rms(seeds[0], values) < 1.5 * seeds[1]
+    # other directions, so other samples: two bakes that are ERROR off at the most, and not the same way
+    assert relative_rms(seeds[0], values) < 2**0.5 * ERROR
     assert values.mean() == pytest.approx(seeds[0].mean(), rel=0.02)
 
 

@@ -1,0 +1,75 @@
+"""Direct light at receivers: shadow rays go where they take most off its noise, until it is small beside the light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .allocation import rays_due
+
+FIRST = 1 / 4  # of the shadow rays of a penumbra, for the first look at direct light, ...
+LEAST_FIRST = 16  # ... but no fewer: with its neighbours' a receiver then has hundreds, and they know what is hidden
+MOST_SAMPLES = 4096
+SHARE = 0.6  # of the error that direct light may have
+PASSES = 2  # after the first look; its noise says well what is due, and a second one mends what it missed
+GROWTH = 2  # times the rays it has, that a receiver must be due to go on
+
+
+@dataclass(frozen=True, slots=True)
+class DirectLight:
+    """What lights give receivers straight.
+
+    Attributes
+    ----------
+    values : float32 (N, 3) E [W/m^2]
+    variance : float32 (N,) of its luminance, as two replicates state it
+    samples : int64 (N,) shadow rays that were meant for each
+    rays : shadow rays traced
+    """
+
+    values: np.ndarray
+    variance: np.ndarray
+    samples: np.ndarray
+    rays: int
+
+
+def shadow_samples(error: float) -> int:
+    """Shadow rays of a receiver in penumbra: stratified, so that their error falls nearly as 1 / rays."""
+    return int(min(max(2 ** round(np.log2(3.2 / error)), 16), 2048))
+
+
+def first_direct(trace: Callable, count: int, error: float, seed: int) -> DirectLight:
+    """A first look at the direct light of ``count`` receivers.
+
+    ``trace`` is (chosen (K,), samples, seed) -> what KernelScene.direct gives for these receivers.
+    """
+    samples = max(int(FIRST * shadow_samples(error)), LEAST_FIRST)
+    values, variance, rays = trace(np.arange(count), samples, seed)
+    return DirectLight(values, variance, np.full(count, samples), rays)
+
+
+def refined_direct(
+    first: DirectLight, trace: Callable, pooled: Callable, scale: np.ndarray, error: float, seed: int
+) -> DirectLight:
+    """Direct light whose noise comes to ``SHARE`` of the error, relative to ``scale`` (N,), the RMS over receivers.
+
+    ``pooled`` averages (N,) over neighbours: two replicates agree by chance as often as not, and all of their rays may
+    miss a lamp that is seen through a gap.
+    """
+    values, variance, samples = first.values.copy(), first.variance.copy(), first.samples.copy()
+    rays = first.rays
+    for attempt in range(1, PASSES + 1):
+        of_one_ray = np.minimum(variance / scale**2, 1.0) * samples
+        noise = np.sqrt(np.minimum(pooled(of_one_ray) / samples, 1.0))
+        if np.sqrt(np.mean(noise**2)) <= SHARE * error:
+            break
+        due = np.minimum(rays_due(noise, samples, SHARE * error), MOST_SAMPLES)
+        wanted = 2 ** np.ceil(np.log2(np.maximum(due, 1))).astype(np.int64)
+        for count in np.unique(wanted[wanted >= GROWTH * samples]):
+            chosen = np.flatnonzero((wanted == count) & (wanted >= GROWTH * samples))
+            values[chosen], variance[chosen], traced = trace(chosen, int(count), seed + 1000 * attempt)
+            samples[chosen] = count
+            rays += traced
+    return DirectLight(values, variance, samples, rays)
