@@ -1,0 +1,60 @@
+"""Shadow rays go to the receivers whose noise is seen, until the error is met, held against a lamp of known noise."""
+
+import numpy as np
+
+from addon.core.direct_light import SHARE, first_direct, refined_direct
+from addon.core.smoothing import pooled
+
+COUNT = 4096
+LIGHT = 2.0
+
+
+class Lamp:
+    """Gives each receiver LIGHT; a penumbra's rays are independent, with a deviation of their own (N,)."""
+
+    def __init__(self, deviation):
+        self.deviation, self.asked, self.rng = deviation, [], np.random.default_rng(5)
+
+    def __call__(self, chosen, samples, seed):
+        self.asked.append((chosen, samples))
+        spread = self.deviation[chosen, None] / np.sqrt(samples / 2)
+        replicates = LIGHT + spread * self.rng.standard_normal((len(chosen), 2))
+        variance = 0.25 * (replicates[:, 0] - replicates[:, 1]) ** 2
+        grey = np.repeat(replicates.mean(axis=1)[:, None], 3, axis=1)
+        return grey.astype(np.float32), variance.astype(np.float32), len(chosen) * samples
+
+
+def run(deviation, error, scale=LIGHT):
+    lamp = Lamp(deviation)
+    first = first_direct(lamp, COUNT, error, 1)
+    found = refined_direct(first, lamp, lambda noise: pooled(None, None, None, noise), np.full(COUNT, scale), error, 1)
+    return lamp, first, found
+
+
+def penumbra():
+    """Every other stretch of 256 receivers is in penumbra."""
+    return np.where(np.arange(COUNT) // 256 % 2, 2.0, 0.0)
+
+
+def test_noise_comes_to_its_share_of_the_error_and_not_by_more_rays_than_that_takes():
+    error = 0.05
+    _, first, found = run(penumbra(), error)
+    before, after = (np.sqrt(np.mean((light.values[:, 0] / LIGHT - 1) ** 2)) for light in (first, found))
+    # half the receivers, 2048 of them, each a chi square: the RMS is known to 2 %, pooled noise of ten to some more
+    assert before > 2 * SHARE * error
+    assert 0.5 * SHARE * error < after < 1.1 * SHARE * error
+
+
+def test_what_is_calm_among_its_neighbours_gets_no_more_rays():
+    deviation = penumbra()
+    lamp, first, found = run(deviation, 0.02)
+    # of calm stretches only the ends have noisy neighbours
+    ends = np.convolve(deviation, np.ones(5), "same") > 0
+    assert (found.samples[~ends] == first.samples[~ends]).all()
+    assert np.mean(found.samples[deviation > 0] > first.samples[deviation > 0]) > 0.95
+    assert found.rays == sum(len(chosen) * samples for chosen, samples in lamp.asked)
+
+
+def test_noise_that_other_light_hides_is_left_alone():
+    _, first, found = run(penumbra(), 0.05, scale=100 * LIGHT)
+    assert (found.samples == first.samples).all()
