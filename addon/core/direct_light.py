@@ -40,18 +40,18 @@ def shadow_samples(error: float) -> int:
     return int(min(max(2 ** round(np.log2(3.2 / error)), 16), 2048))
 
 
-def first_direct(trace: Callable, count: int, error: float, seed: int) -> DirectLight:
-    """A first look at the direct light of ``count`` receivers.
+def first_direct(trace: Callable, error: float, seed: int, on_step: Callable[[float], None]) -> DirectLight:
+    """A first look at the direct light of all receivers.
 
-    ``trace`` is (chosen (K,), samples, seed) -> what KernelScene.direct gives for these receivers.
+    ``trace`` is (chosen, samples, seed, on_step) -> what KernelScene.direct gives for the chosen receivers.
     """
     samples = max(int(FIRST * shadow_samples(error)), LEAST_FIRST)
-    values, variance, rays = trace(np.arange(count), samples, seed)
-    return DirectLight(values, variance, np.full(count, samples), rays)
+    values, variance, rays = trace(slice(None), samples, seed, on_step)
+    return DirectLight(values, variance, np.full(len(values), samples), rays)
 
 
 def refined_direct(
-    first: DirectLight, trace: Callable, pooled: Callable, scale: np.ndarray, error: float, seed: int
+    first: DirectLight, trace: Callable, pooled: Callable, scale, error: float, seed: int, on_step
 ) -> DirectLight:
     """Direct light whose noise comes to ``SHARE`` of the error, relative to ``scale`` (N,), the RMS over receivers.
 
@@ -67,9 +67,18 @@ def refined_direct(
             break
         due = np.minimum(rays_due(noise, samples, SHARE * error), MOST_SAMPLES)
         wanted = 2 ** np.ceil(np.log2(np.maximum(due, 1))).astype(np.int64)
-        for count in np.unique(wanted[wanted >= GROWTH * samples]):
-            chosen = np.flatnonzero((wanted == count) & (wanted >= GROWTH * samples))
-            values[chosen], variance[chosen], traced = trace(chosen, int(count), seed + 1000 * attempt)
+        wanted[wanted < GROWTH * samples] = 0
+        # half of what is left of the bar for each pass
+        begin, width = 1 - 0.5 ** (attempt - 1), 0.5**attempt / max(wanted.sum(), 1)
+        for count in np.unique(wanted[wanted > 0]):
+            chosen = np.flatnonzero(wanted == count)
+            share = width * count * len(chosen)
+            values[chosen], variance[chosen], traced = trace(
+                chosen,
+                int(count),
+                seed + 1000 * attempt,
+                lambda done: on_step(begin + share * done),  # noqa: B023
+            )
             samples[chosen] = count
-            rays += traced
+            rays, begin = rays + traced, begin + share
     return DirectLight(values, variance, samples, rays)

@@ -167,18 +167,18 @@ def _first_look(job: _Job, grid: TexelGrid | None, error, seed, on_step):
     Direct light comes in two parts, as how much noise it may have depends on what else there is.
     """
 
-    def trace(done, width):
-        return lambda chosen, *asked: job.part(chosen).direct(*asked, lambda part: on_step(done + width * part))
-
-    first = first_direct(trace(0.0, 0.1), len(job.receivers), error, seed)
-    means, _, rays = _gathered(job, LOOK_RAYS, seed + 2, lambda done: on_step(0.1 + 0.1 * done))
-    look = means.mean(axis=1) if grid is None else blurred(job.kernel.workers, grid, job.receivers, means)
-    scale = scale_of(first.values + look)
+    def trace(chosen, samples, seed, on_step):
+        return job.part(chosen).direct(samples, seed, on_step)
 
     def over_neighbours(of_one_ray):
         return pooled(job.kernel.workers, grid, job.receivers, of_one_ray)
 
-    return refined_direct(first, trace(0.2, 0.2), over_neighbours, scale, error, seed), look, rays
+    first = first_direct(trace, error, seed, lambda done: on_step(0.1 * done))
+    means, _, rays = _gathered(job, LOOK_RAYS, seed + 2, lambda done: on_step(0.1 + 0.1 * done))
+    look = means.mean(axis=1) if grid is None else blurred(job.kernel.workers, grid, job.receivers, means)
+    scale = scale_of(first.values + look)
+    direct = refined_direct(first, trace, over_neighbours, scale, error, seed, lambda done: on_step(0.2 + 0.2 * done))
+    return direct, look, rays
 
 
 def _with_texel_light(job: _Job, grid: TexelGrid, direct, look):
@@ -268,12 +268,14 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
         begin += width
         budget = budget or int(max(MOST_COST * rays, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
         means, before = sums / taken[:, None, None].astype(np.float32), rms
+        near = None
         if grid:
             # blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while
             # smoothing that minds values would take some of a few rays' light away
-            job = _seeing(job, grid, direct, blurred(job.kernel.workers, grid, job.receivers, means))
+            near = blurred(job.kernel.workers, grid, job.receivers, means)
+            job = _seeing(job, grid, direct, near)
         probes = probes or _measure(job.part(chosen), error, seed + 1)
-        found, relative = _best_estimate(job, grid, means, taken, direct, chosen, probes)
+        found, relative = _best_estimate(job, grid, means, near, taken, direct, chosen, probes)
         is_asked = error < rms_of(found.squares) <= DENOISE * error
         if is_asked:
             found = _denoised(job, grid, found, means, direct, chosen, probes)
@@ -320,15 +322,15 @@ def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:
     return rays
 
 
-def _best_estimate(job, grid, means, taken, direct, chosen, probes):
-    """What replicate means (N, R, 3) come to, a _Found, and its relative noise (N,).
+def _best_estimate(job, grid, means, near, taken, direct, chosen, probes):
+    """What replicate means (N, R, 3) come to, a _Found, and its relative noise (N,); ``near`` is the means blurred.
 
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
     """
     variance = (means @ LUMINANCE).var(axis=1, ddof=1) / REPLICATES
     estimates = [(means.mean(axis=1), pooled(job.kernel.workers, None, job.receivers, variance * taken) / taken)]
     if grid is not None:
-        estimates.append(smoothed(job.kernel.workers, grid, job.receivers, means, taken))
+        estimates.append(smoothed(job.kernel.workers, grid, job.receivers, means, near, taken))
     best = None
     for gathered, noise in estimates:
         values = (direct + gathered).astype(np.float32)

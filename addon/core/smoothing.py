@@ -73,16 +73,16 @@ def pooled(workers: Workers, grid: TexelGrid | None, receivers: Receivers, of_on
     return smooth(workers, grid, receivers, np.repeat(of_one_ray[:, None], 3, axis=1), of_one_ray, 1, False)[0][:, 0]
 
 
-def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means, taken):
+def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means, near, taken):
     """Replicate means (N, R, 3) of gathered light, smoothed: values float32 (N, 3), variance of luminance (N,).
 
-    ``taken`` (N,) is how many rays each mean is of.
+    ``near`` (N, 3) is the means ``blurred``, ``taken`` (N,) how many rays each is of.
     """
     values = means.mean(axis=1, dtype=np.float32)
     variances = (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]
     variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
-    # relative to the light there, as the noise of what is bright says nothing of the calm beside it
-    scales = scale_of(smooth(workers, grid, receivers, values, variances, 1, False)[0])
+    # pooled relative to the light there, as the noise of what is bright says nothing of the calm beside it
+    scales = scale_of(near)
     relative = pooled(workers, grid, receivers, variances / scales**2 * taken) / taken
     noise = np.minimum(relative * scales**2, LARGEST_VARIANCE).astype(np.float32)
     for step in STEPS:

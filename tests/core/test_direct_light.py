@@ -13,21 +13,31 @@ class Lamp:
     """Gives each receiver LIGHT; a penumbra's rays are independent, with a deviation of their own (N,)."""
 
     def __init__(self, deviation):
-        self.deviation, self.asked, self.rng = deviation, [], np.random.default_rng(5)
+        self.deviation, self.rays, self.rng = deviation, 0, np.random.default_rng(5)
 
-    def __call__(self, chosen, samples, seed):
-        self.asked.append((chosen, samples))
+    def __call__(self, chosen, samples, seed, on_step):
         spread = self.deviation[chosen, None] / np.sqrt(samples / 2)
-        replicates = LIGHT + spread * self.rng.standard_normal((len(chosen), 2))
+        self.rays += len(spread) * samples
+        replicates = LIGHT + spread * self.rng.standard_normal((len(spread), 2))
         variance = 0.25 * (replicates[:, 0] - replicates[:, 1]) ** 2
         grey = np.repeat(replicates.mean(axis=1)[:, None], 3, axis=1)
-        return grey.astype(np.float32), variance.astype(np.float32), len(chosen) * samples
+        on_step(0.5)
+        on_step(1.0)
+        return grey.astype(np.float32), variance.astype(np.float32), len(spread) * samples
 
 
 def run(deviation, error, scale=LIGHT):
-    lamp = Lamp(deviation)
-    first = first_direct(lamp, COUNT, error, 1)
-    found = refined_direct(first, lamp, lambda noise: pooled(None, None, None, noise), np.full(COUNT, scale), error, 1)
+    lamp, told = Lamp(deviation), []
+    first = first_direct(lamp, error, 1, told.append)
+    assert told == [0.5, 1.0]
+    told.clear()
+
+    def over_neighbours(noise):
+        return pooled(None, None, None, noise)
+
+    found = refined_direct(first, lamp, over_neighbours, np.full(COUNT, scale), error, 1, told.append)
+    assert told == sorted(told)
+    assert all(0 < done < 1 for done in told)
     return lamp, first, found
 
 
@@ -52,7 +62,7 @@ def test_what_is_calm_among_its_neighbours_gets_no_more_rays():
     ends = np.convolve(deviation, np.ones(5), "same") > 0
     assert (found.samples[~ends] == first.samples[~ends]).all()
     assert np.mean(found.samples[deviation > 0] > first.samples[deviation > 0]) > 0.95
-    assert found.rays == sum(len(chosen) * samples for chosen, samples in lamp.asked)
+    assert found.rays == lamp.rays
 
 
 def test_noise_that_other_light_hides_is_left_alone():

@@ -33,7 +33,8 @@ def noisy(light, deviation, seed=1):
 
 def run(grid, receivers, means, taken=1):
     with Workers(2) as workers:
-        return smoothed(workers, grid, receivers, means, np.broadcast_to(taken, len(means)))
+        near = blurred(workers, grid, receivers, means)
+        return smoothed(workers, grid, receivers, means, near, np.broadcast_to(taken, len(means)))
 
 
 @pytest.mark.parametrize("step", [1, 4])
