@@ -86,7 +86,8 @@ def _densest(flat, texels, width, density):
     """The densest packing found in a few tries: what a density takes is known by trying only."""
     best, tries = None, []
     for _ in range(ATTEMPTS):
-        tried = _pack_once(flat, density, width)
+        # no chart is longer than all texels in a row, however thin
+        tried = _pack_once(flat, min(density, texels / flat.sizes.max()), width)
         tries.append(tried)
         if tried.texels <= texels and (best is None or tried.density > best.density):
             best = tried

@@ -64,14 +64,13 @@ def side_kinds(patches, radiosity, spread, is_confined):
     luminance = radiosity @ LUMINANCE
     lit = np.flatnonzero((luminance > 0) & (patches.side_areas > 0))
     typical = _weighted_median(luminance[lit], patches.side_areas[lit]) if len(lit) else 0.0
-    spread = spread * patches.side_reflectance.mean(axis=1) / (luminance + typical + 1e-300)
-    is_bright = (luminance > BRIGHT * typical) & (spread <= MIXED) & (patches.side_areas > 0)
+    is_mixed = spread * patches.side_reflectance.mean(axis=1) > MIXED * (luminance + typical)
+    is_bright = (luminance > BRIGHT * typical) & ~is_mixed & (patches.side_areas > 0)
     is_bright &= _brightest(luminance, patches.side_areas, BRIGHT_SHARE)
     is_bright &= ~is_confined
     flux = luminance * patches.side_areas * ~is_confined
     if flux[is_bright].sum() < BRIGHT_FLUX * flux.sum():
         is_bright[:] = False
-    is_mixed = spread > MIXED
     return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
 
 

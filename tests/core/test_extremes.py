@@ -54,6 +54,23 @@ def test_a_sliver_takes_no_more_patches_than_its_share(length):
     assert patches.areas.sum() == pytest.approx(0.5e-3 * length**2)
 
 
+@pytest.mark.parametrize("texels", [64, 1024])
+def test_a_needle_longer_than_an_atlas_is_unwrapped(texels):
+    needle = Part([(0, 0, 0), (-1e8, 0, 0), (0, 1e-30, 0)], [(0, 1, 2)])
+    lit = bake(scene_of([needle]), BakeSettings(target="lightmap", error=0.5, texels=texels, threads=1)).lightmap
+    assert lit.pixels.shape[0] * lit.pixels.shape[1] <= texels
+    assert np.isfinite(lit.uvs).all()
+
+
+def test_a_glow_that_nothing_sends_back_is_no_number_lost():
+    # no patch is lit, and light that is spread unevenly has nothing to be held against
+    glowing = Material("glow", reflectance=(0.0, 0.3, 0.0), radiance=(0.0, 0.0, 1e15))
+    walls = Part([(0, 0, 0), (0, 0, 1), (0, 0.5, 0), (0.5, 0, 0), (0, 0, 0.5)], [(0, 1, 2), (0, 3, 4)], glowing)
+    with np.errstate(over="raise", divide="raise", invalid="raise"):
+        result = bake(scene_of([walls]), BakeSettings(**{**QUICK, "target": "lightmap"}))
+    assert np.isfinite(result.lightmap.pixels).all()
+
+
 def test_patches_that_no_memory_holds_are_refused():
     with pytest.raises(SettingsError, match="patch_size is 1e-06"):
         bake(many_faces(), BakeSettings(**{**QUICK, "patch_size": 1e-6}))
