@@ -69,11 +69,17 @@ def sound_faces(scene: Scene) -> SoundFaces:
 
 
 def _have_area(corners):
-    """Which triangles (N, 3, 3) are more than a line once they are float32 relative to their middle, bool (N,)."""
+    """Which triangles (N, 3, 3) are more than a line, as they are and once they are float32 relative to their middle,
+    bool (N,)."""
     if not len(corners):
         return np.zeros(0, bool)
     flat = corners.reshape(-1, 3)
-    corners = (corners - 0.5 * (flat.min(axis=0) + flat.max(axis=0))).astype(np.float32)
+    rounded = (corners - 0.5 * (flat.min(axis=0) + flat.max(axis=0))).astype(np.float32)
+    # rounding may open a line as well as close a triangle
+    return _are_open(corners) & _are_open(rounded)
+
+
+def _are_open(corners):
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     areas, first, second = (np.linalg.norm(v, axis=1) for v in (np.cross(first, second), first, second))
     return areas > LEAST_SINE * first * second

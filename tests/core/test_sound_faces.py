@@ -49,6 +49,13 @@ def test_a_bad_face_changes_no_bit_of_the_others_and_is_named(kind, target):
     assert any(w.startswith("object bad: 2 of 2 triangles") and "left out" in w for w in report.warnings)
 
 
+def test_rounding_in_a_large_hall_does_not_open_a_line():
+    # as float32 about the middle of a kilometre its corners lie 3e-5 off, and what is no area has one
+    hall = box((0, 0, 0), (1000, 1000, 1000), inwards=True, name="hall")
+    line = Part([(1.2, 1.35, 1.7), (1.4, 1.55, 1.7), (1.8, 1.95, 1.7)], [(0, 1, 2)], name="line")
+    assert sound_faces(scene_of([hall, line])).kept.tolist() == [True] * 12 + [False]
+
+
 def test_each_kind_of_fault_is_told_with_its_number():
     scene = scene_of([ROOM, bad_part(["NaN", "1e30", "line", "point", "infinite"])])
     warnings = sound_faces(scene).scene.warnings
