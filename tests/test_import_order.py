@@ -16,7 +16,7 @@ CORE_ORDER = (
     *("ranges", "settings", "scene", "sound_faces", "textures", "emitters", "relative", "z_order"),
     *("report", "workers", "kernel", "patches", "parted"),
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
-    *("transport", "aimed", "sampled", "estimators", "exchange", "solver", "dense"),
+    *("transport", "aimed", "hemicube", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
     *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides"),
     *("patch_solution", "patch_light", "decomposition", "choose", "radiosity"),

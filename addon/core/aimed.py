@@ -79,22 +79,23 @@ def _exchange(kernel, is_target, emitter, target, rays, first, seeds):
 
 
 def _integrand(kernel, is_target, emitter, target, points):
-    origins, ends = _points_on(emitter, points[:, :2]), _points_on(target, points[:, 2:])
+    origins, ends = points_on(emitter, points[:, :2]), points_on(target, points[:, 2:])
     normals = unit_normal(emitter), unit_normal(target)
     along = ends - origins
     squared = (along**2).sum(axis=1)
     kernels = (along @ normals[0]) * -(along @ normals[1]) / (np.pi * squared**2)  # eq. 4.13
-    return np.stack([kernels * _are_visible(kernel, is_target, origins, normals[0], along), kernels], axis=1)
+    return np.stack([kernels * are_visible(kernel, is_target, origins, normals[0], along), kernels], axis=1)
 
 
-def _are_visible(kernel, is_target, origins, normal, along):
-    origins = origins + PUSH * np.abs(origins - kernel.centre).max() * normal
+def are_visible(kernel: KernelScene, is_target, origins, normal, along):
+    """Whether nothing but the target stops rays before their ends, bool (N,): origins + along (N, 3) [m]."""
+    origins = origins + PUSH * np.abs(origins - kernel.centre).max(initial=0.0) * normal
     triangles, hits = kernel.closest_hits(origins, along)
     # past an edge by rounding is no miss: it was aimed at the target
     return (triangles < 0) | is_target[triangles] | (hits[:, 2] > 1 - END)
 
 
-def _points_on(corners, places):
+def points_on(corners, places):
     """Points on a convex polygon (K, 3), evenly by area, of places (N, 2) in the unit square."""
     if len(corners) == 4 and np.abs(corners[0] - corners[1] + corners[2] - corners[3]).max() <= 1e-12 * extent(corners):
         return corners[0] + places[:, :1] * (corners[1] - corners[0]) + places[:, 1:] * (corners[3] - corners[0])

@@ -12,9 +12,10 @@ import numpy as np
 from .aimed import PUSH, aimed_exchanges, pairs_apart
 from .analytic import Surface
 from .bodies import PANEL_ERROR, Body
+from .hemicube import hemicube_exchanges, pairs_seen
 from .kernel import KernelScene
 from .patches import subdivide
-from .polygon import are_coplanar, bisect, distance_to, extent, fault_of, polygon_area
+from .polygon import are_coplanar, bisect, distance_to, extent, fault_of, heights_above, polygon_area, unit_normal
 from .quadrature import fan
 from .scene import Material, Scene, SceneObject
 from .transport import REPLICATES, Estimate, HemicubeFormFactors, MonteCarloFormFactors, estimate, replicated
@@ -58,7 +59,7 @@ class SampledEstimator:
     def setting(self) -> str:
         """What is the same for every case, in words."""
         how = (
-            f"hemicubes of {self.resolution}^2"
+            f"hemicubes of {self.resolution}^2, over one target until {AIMED_WANTED:g} or 2^{_log2(AIMED_RAYS)}"
             if self.name == "hemicube"
             else f"cosine rays, rays aimed at what stands apart until {AIMED_WANTED:g} or 2^{_log2(AIMED_RAYS)}"
         )
@@ -74,7 +75,7 @@ class SampledEstimator:
         if target.area < emitter.area:
             share = target.area / emitter.area
             emitter, target = target, emitter
-        pairs = pairs_apart(emitter.pieces, target.pieces) if self.name == "monte-carlo" else None
+        pairs = self._pairs(emitter, target, blockers)
         if pairs is not None:
             return self._aimed(emitter, target, blockers, pairs, share)
         row = self._row(emitter, [target, *blockers], self.wanted / share)
@@ -102,8 +103,16 @@ class SampledEstimator:
         found = self.matrix([body.surface() for body in bodies])
         return replace(found, bound=found.bound + PANEL_ERROR * np.abs(found.value))
 
+    def _pairs(self, emitter, target, blockers):
+        """Pairs of parts of two surfaces between which rays can be aimed; None where they cannot."""
+        if self.name == "monte-carlo":
+            return pairs_apart(emitter.pieces, target.pieces)
+        # rays start off their surface: the target may be nearer than that, a blocker would hide nothing
+        is_close = any(_lies_on(p, piece) for piece in emitter.pieces for blocker in blockers for p in blocker.pieces)
+        return None if is_close else pairs_seen(emitter.pieces, target.pieces)
+
     def _aimed(self, emitter, target, blockers, pairs, share) -> Estimate:
-        """F from a surface to one that stands apart, times ``share``, refined until its bound is as wanted."""
+        """F from a surface to another by rays at it alone, times ``share``, refined until its bound is as wanted."""
         if not pairs:
             return Estimate(*(np.zeros(()) for _ in Estimate.__slots__))
         origin = emitter.pieces[0][0]
@@ -111,14 +120,15 @@ class SampledEstimator:
         kernel = KernelScene(_scene_about(origin, triangles), self.workers)
         pairs = [(a - origin, b - origin) for a, b in pairs]
         seeds, scale = [self.seed + k for k in range(REPLICATES)], share / emitter.area
-        rays = max(1, FIRST_RAYS // (REPLICATES * len(pairs)))
-        rays, done, sums = 1 << (rays - 1).bit_length(), 0, 0.0
+        rays_each = 1 if self.name == "monte-carlo" else self.resolution**2
+        points = max(1, FIRST_RAYS // (REPLICATES * len(pairs) * rays_each))
+        points, done, sums = 1 << (points - 1).bit_length(), 0, 0.0
         while True:
-            # a whole power of two is even all over: the first rays and as many again
-            sums = sums + rays * scale * aimed_exchanges(kernel, owners == 0, pairs, rays, done, seeds)
-            done += rays
-            rays = done
-            traced = REPLICATES * len(pairs) * done
+            # a whole power of two is even all over: the first points and as many again
+            sums = sums + points * scale * self._exchanges(kernel, owners == 0, pairs, points, done, seeds)
+            done += points
+            points = done
+            traced = REPLICATES * len(pairs) * done * rays_each
             seen, unhidden = np.moveaxis(sums / done, 1, 0)
             # what no ray has found to be hidden is a share of what is not
             found = estimate(seen, traced / max(unhidden.mean(), 1e-300))
@@ -126,6 +136,11 @@ class SampledEstimator:
             limit = AIMED_LIMIT if hoped <= AIMED_WANTED * share else AIMED_RAYS
             if found.bound <= AIMED_WANTED * share or 2 * traced > limit:
                 return found
+
+    def _exchanges(self, kernel, is_target, pairs, points, first, seeds):
+        if self.name == "monte-carlo":
+            return aimed_exchanges(kernel, is_target, pairs, points, first, seeds)
+        return hemicube_exchanges(kernel, is_target, pairs, self.resolution, points, first, seeds)
 
     def _row(self, emitter, others, wanted, own=None) -> Estimate:
         """F from a surface to each of the others, float64 (N,), refined until its bound is as wanted.
@@ -184,6 +199,12 @@ def nearest(piece, others) -> float:
 def part_push(piece, others) -> float:
     """How far off a piece its rays start, in distances from its centre to what is nearest, doubled."""
     return 2 * PUSH * np.abs(piece - piece.mean(axis=0)).max() / nearest(piece, others)
+
+
+def _lies_on(blocker, piece) -> bool:
+    """Whether a piece's rays start beyond too much of a blocker, which rises too little over its plane."""
+    rise = heights_above(blocker, piece[0], unit_normal(piece)).max()
+    return 0 < PUSH_ALLOWED * rise < 2 * PUSH * np.abs(piece - piece.mean(axis=0)).max()
 
 
 def emitting_parts(emitter: Surface, others, method: str):

@@ -76,6 +76,9 @@ class Material:
         owner = f"material {self.name}"
         require_colour(owner, "reflectance", self.reflectance, 1.0)
         require_colour(owner, "radiance", self.radiance, BRIGHTEST)
+        if self.radiance_texture is not None:
+            brightest = np.array(self.radiance, np.float64) * self.radiance_texture.pixels.max(axis=(0, 1))
+            require_colour(owner, "radiance times its texture", brightest, BRIGHTEST)
         require_colour(owner, "transmittance", self.transmittance, 1.0)
 
     @property

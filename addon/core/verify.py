@@ -118,8 +118,8 @@ HANDLERS: tuple[tuple[Callable[[Case], bool], Handler], ...] = (
      case_solutions.plates_case),
 )  # fmt: skip
 
-# at which a sampled factor stops, with eight times the rays, where a class asks for more than the estimator's own
-WANTED = {"FF-TOUCHING": 1e-4}
+# times as many rays where a class is narrow for what is seen of many small pieces, each of which takes a share of them
+MORE_RAYS = {"FF-CURVED": 4}
 
 
 def run_case(case: Case, estimator, method: str) -> CaseResult:
@@ -131,9 +131,8 @@ def run_case(case: Case, estimator, method: str) -> CaseResult:
         if handler is None:
             raise CaseError("the quantity is not understood")
         if isinstance(estimator, SampledEstimator):
-            wanted = WANTED.get(case.tolerance_class, estimator.wanted)
-            more = 8 if wanted < estimator.wanted else 1
-            estimator = replace(estimator, wanted=wanted, ray_limit=more * estimator.ray_limit)
+            more = MORE_RAYS.get(case.tolerance_class, 1)
+            estimator = replace(estimator, ray_limit=more * estimator.ray_limit)
             if handler.__module__ in (case_solutions.__name__, case_spheres.__name__):
                 estimator = estimator.coarser()
         found = handler(case, estimator)

@@ -127,8 +127,8 @@ pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, si
  * Monte Carlo: cosine rays, stratified in position and direction together by a 4-D Owen-scrambled Sobol
  * sequence (Burley 2020). Hemicube (Cohen & Greenberg 1985): delta form factors of a half cube's pixels,
  * normalised to sum to 1 [their eqs. 12-13], from `positions` points spread over the patch, each
- * hemicube turned about the normal by an angle of its own, its rays through a point of the pixels of its own: where
- * all went through the middles, a long edge would fall on the same side of them at every position (aliasing).
+ * hemicube turned about the normal by an angle of its own, its rays through random points of its pixels: where all
+ * went through the middles, a long edge would fall on the same side of them at every position (aliasing).
  *
  *   sides      count of them: 2 * patch + side
  *   rays       per side, at least 1

@@ -56,6 +56,11 @@ NUMBERS_OUT_OF_RANGE = [
     (Material, {"reflectance": (0.5, 1.5, 0.5)}, "material it: reflectance"),
     (Material, {"reflectance": (np.nan, 0.5, 0.5)}, "material it: reflectance"),
     (Material, {"radiance": (-1.0, 0.0, 0.0)}, "material it: radiance"),
+    (
+        Material,
+        {"radiance": (0.0, 1e8, 0.0), "radiance_texture": Texture("image", np.full((1, 1, 3), 1e8, np.float32))},
+        "material it: radiance times its texture is \\(0, 1e\\+16, 0\\): allowed is 0 ... 1e\\+15",
+    ),
     (Material, {"transmittance": (0.0, 2.0, 0.0)}, "material it: transmittance"),
     (PointLight, {"position": (0, 0, np.inf), "intensity": (1, 1, 1)}, "light it: position"),
     (PointLight, {"position": (0, 0, 0), "intensity": (1, 1e30, 1)}, "light it: intensity"),

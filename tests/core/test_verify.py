@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from addon.core.analytic import surface
 from addon.core.cases import CaseError, load_cases, parse_cases, tolerance_of
 from addon.core.estimators import make_estimator
 from addon.core.shipped_cases import shipped_cases
@@ -106,18 +107,33 @@ def test_sampled_methods_state_an_error_that_covers(method):
     assert 0 < result.stated_error < 1e-3
 
 
-def test_nothing_hit_is_never_certain():
-    far = PLATES | {"B": [[x, y, 1e5] for x, y, _ in PLATES["B"]]}
-    result = run("hemicube", value=1 / (np.pi * 1e10), geometry={"surfaces": far})
+def far_plates(distance):
+    return PLATES | {"B": [[x, y, distance] for x, y, _ in PLATES["B"]]}
+
+
+def test_what_is_all_hidden_is_never_certain():
+    screen = [[-9, -9, 0.5], [9, -9, 0.5], [9, 9, 0.5], [-9, 9, 0.5]]
+    result = run("hemicube", value=0.0, geometry={"surfaces": PLATES, "occluders": {"screen": screen}})
     assert result.value == 0
     assert result.stated_error > 0
     assert result.covered
 
 
-def test_what_lies_between_the_rays_of_hemicubes_is_covered():
+def test_hemicubes_see_what_is_smaller_than_a_pixel():
+    result = run("hemicube", value=howell.c11(1, 1, 100), geometry={"surfaces": far_plates(100.0)})
+    assert result.covered
+    assert result.error < 1e-5 * result.exact
+
+
+@pytest.mark.parametrize("distance", [1e2, 1e5])
+def test_what_lies_between_the_rays_of_whole_hemicubes_is_covered(distance):
     """A target smaller than a pixel that none of 340 hemicubes hits: each pixel there stands for 1 / 201 of a row."""
-    far = PLATES | {"B": [[x, y, 100.0] for x, y, _ in PLATES["B"]]}
-    assert run("hemicube", value=1 / (np.pi * 1e4), geometry={"surfaces": far}).covered
+    plates = [surface(name, corners) for name, corners in far_plates(distance).items()]
+    with Workers(2) as workers:
+        found = make_estimator("hemicube", workers).matrix(plates)
+    assert found.bound[0, 1] > 0
+    # Howell C-11 far away: 1 / (pi c^2)
+    assert abs(found.value[0, 1] - 1 / (np.pi * distance**2)) <= found.bound[0, 1]
 
 
 def test_a_report_is_plain_numbers():

@@ -1,10 +1,11 @@
-"""Aimed rays: exact values where surfaces stand apart, none where they touch, and what is hidden."""
+"""Rays at a target only, aimed or through a hemicube's pixels: exact where nothing hides it, and what is hidden."""
 
 import numpy as np
 import pytest
 
 from addon.core.aimed import pairs_apart
 from addon.core.analytic import surface
+from addon.core.estimators import AnalyticEstimator
 from addon.core.kernel import sobol_points
 from addon.core.sampled import SampledEstimator
 from addon.core.workers import Workers
@@ -12,13 +13,21 @@ from tests.reference.exchange import exchange
 
 FLOOR = surface("floor", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
 CEILING = surface("ceiling", [(0, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0, 1)])
+WALL = surface("wall", [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)])
 C_11 = 0.19982489569838738  # Howell: opposed unit squares, distance 1
+C_14 = 0.20004377607540316  # Howell: unit squares with a common edge, at a right angle
+
+
+@pytest.fixture(params=["monte-carlo", "hemicube"])
+def estimator(request):
+    with Workers(2) as workers:
+        yield SampledEstimator(request.param, workers)
 
 
 @pytest.fixture
-def estimator():
+def hemicubes():
     with Workers(2) as workers:
-        yield SampledEstimator("monte-carlo", workers)
+        yield SampledEstimator("hemicube", workers)
 
 
 def test_what_stands_apart_is_right_to_a_millionth(estimator):
@@ -36,7 +45,9 @@ def test_a_blocker_hides_all_or_half(estimator):
     left = [surface("a", [(0, 0, 0), (0.5, 0, 0), (0.5, 1, 0), (0, 1, 0)]),
             surface("b", [(0, 0, 1), (0, 1, 1), (0.5, 1, 1), (0.5, 0, 1)])]  # fmt: skip
     # what stands on the target is not taken for it: the bound of both, and rays' ends are good to 2^-19
-    assert estimator.factor(FLOOR, CEILING, [wall]).value == pytest.approx(estimator.factor(*left).value, abs=1e-6)
+    found, half = estimator.factor(FLOOR, CEILING, [wall]), estimator.factor(*left)
+    assert abs(found.value - half.value) < max(1e-6, found.bound + half.bound)
+    assert found.bound < 1e-4
 
 
 def test_random_blockers_against_pairs_of_random_points(estimator):
@@ -52,8 +63,30 @@ def test_random_blockers_against_pairs_of_random_points(estimator):
 
 
 def test_surfaces_that_touch_have_no_pairs():
-    wall = surface("wall", [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)])
-    assert pairs_apart(FLOOR.pieces, wall.pieces) is None
+    assert pairs_apart(FLOOR.pieces, WALL.pieces) is None
+
+
+def test_hemicubes_are_right_where_surfaces_touch(hemicubes):
+    found = hemicubes.factor(FLOOR, WALL)
+    # next to the edge what is seen of the wall changes at once: positions, not pixels, are what is left of the error
+    assert found.value == pytest.approx(C_14, abs=found.bound)
+    assert found.bound < 1e-4
+
+
+@pytest.mark.parametrize("degrees", [0.1, 30.0, 179.0])
+def test_hemicubes_between_leaves_at_any_angle(hemicubes, degrees):
+    angle = np.radians(degrees)
+    leaf = surface("leaf", [(0, 0, 0), (0, 1, 0), (np.cos(angle), 1, np.sin(angle)), (np.cos(angle), 0, np.sin(angle))])
+    exact = AnalyticEstimator().factor(FLOOR, leaf).value
+    found = hemicubes.factor(FLOOR, leaf)
+    assert found.value == pytest.approx(exact, abs=1e-4)
+    assert abs(found.value - exact) <= found.bound
+
+
+def test_a_hemicube_without_pixels_on_a_needle_still_knows_its_size(hemicubes):
+    needle = surface("needle", [(0, 0, 1), (1e-7, 0, 1), (1, 1, 1)][::-1])
+    exact = AnalyticEstimator().factor(FLOOR, needle).value
+    assert hemicubes.factor(FLOOR, needle).value == pytest.approx(exact, rel=1e-4)
 
 
 def test_surfaces_that_face_away_have_an_empty_list():
