@@ -18,6 +18,7 @@ from .visibility import clip_all
 
 PAIRS_LIMIT = 16  # of convex parts; more are seen at once by the pixels of one whole hemicube
 PIXELS_AT_ONCE = 1 << 19
+WHOLE_POSITIONS = 64  # positions, for one hemicube, at which the whole target's factor is taken: these cost no rays
 # columns: right, up and ahead of each face, in the hemicube's (u, v, normal)
 TOP = np.eye(3)
 SIDES = tuple(np.array([(-y, x, 0), (0, 0, 1), (x, y, 0)], float).T for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1)))
@@ -52,32 +53,35 @@ def hemicube_exchanges(kernel: KernelScene, is_target, pairs, resolution, positi
 
 
 def _exchange(kernel, is_target, emitter, target, resolution, positions, first, seed):
-    together = max(1, PIXELS_AT_ONCE // resolution**2)
-    sums = np.zeros(3)
-    for start in range(0, positions, together):
-        points = sobol_points(first + start, min(together, positions - start), seed).astype(np.float64) + 2.0**-25
-        sums += _seen_from(kernel, is_target, emitter, target, resolution, points)
-    seen, covered, whole = sums * polygon_area(emitter) / positions
+    normal, sums = unit_normal(emitter), np.zeros(2)
+    for points in _points(first, positions, max(1, PIXELS_AT_ONCE // resolution**2), seed):
+        origins = points_on(emitter, points[:, :2])
+        sums += _seen_from(kernel, is_target, origins, normal, target, resolution, points[:, 2:])
+    whole, count = 0.0, WHOLE_POSITIONS * positions
+    for points in _points(WHOLE_POSITIONS * first, count, PIXELS_AT_ONCE // 16, seed):
+        whole += element_factors(points_on(emitter, points[:, :2]), normal, target).sum()
+    whole *= polygon_area(emitter) / count
     # pixels at the target's edge are in or out, which errs for what is seen as for what is covered
-    return (whole if seen == covered else seen / covered * whole), whole
+    return (whole if sums[0] == sums[1] else sums[0] / sums[1] * whole), whole
 
 
-def _seen_from(kernel, is_target, emitter, target, resolution, points):
-    """Sums over positions: of the delta form factors of pixels that see the target, and of those that it covers, and of
-    its whole form factor."""
-    normal = unit_normal(emitter)
-    frame = _frame(normal)
-    origins = points_on(emitter, points[:, :2])
-    corners = target - origins[:, None]
-    sums = np.array([0.0, 0.0, element_factors(origins, normal, target).sum()])
+def _points(first, count, together, seed):
+    """Points of a sequence in the unit cube, float64 (<= together, 4) at a time, amid what rounding cut off."""
+    for start in range(first, first + count, together):
+        yield sobol_points(start, min(together, first + count - start), seed).astype(np.float64) + 2.0**-25
+
+
+def _seen_from(kernel, is_target, origins, normal, target, resolution, places):
+    """Sums of the delta form factors of pixels that see the target, and of those that it covers, float64 (2,)."""
+    frame, corners, sums = _frame(normal), target - origins[:, None], np.zeros(2)
     for face in (TOP, *SIDES):
-        directions, deltas, owners = _covered_pixels(corners @ (frame @ face), face, resolution, points[:, 2:])
+        directions, deltas, owners = _covered_pixels(corners @ (frame @ face), face, resolution, places)
         along = directions @ (frame @ face).T
         # as long as to the target's plane
         heights = corners[owners, 0] @ unit_normal(target)
         along *= (heights / (along @ unit_normal(target)))[:, None]
         seen = are_visible(kernel, is_target, origins[owners], normal, along)
-        sums[:2] += (deltas * seen).sum(), deltas.sum()
+        sums += (deltas * seen).sum(), deltas.sum()
     return sums
 
 

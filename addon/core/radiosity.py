@@ -71,7 +71,9 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     def solve(lit, error, on_step):
         emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
         precision = replace(settings, error=error)
-        return solve_patches(kernel, lit.patches, emitted, solver, method, precision, on_step)
+        found = solve_patches(kernel, lit.patches, emitted, solver, method, precision, on_step)
+        # no surface sends less than it emits: what overshooting or an iteration left below that is its error
+        return replace(found, radiosity=np.maximum(found.radiosity, emitted))
 
     budget = _patch_budget(solver, settings)
     if settings.patch_size or solver == "stochastic":

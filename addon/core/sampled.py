@@ -29,6 +29,7 @@ WHOLE_PIECES = 8  # a surface of more pieces is not cut: its pieces are small al
 COARSE_RAYS = 1 << 22  # of a row, where only a solution is wanted: its errors average out
 FIRST_RAYS = 1 << 18  # of all replicates together
 AIMED_WANTED = 4e-7  # bound of the error at which aimed rays stop
+AIMED_SHARE = 1e-2  # of the value, which it must be as well: a small bound of a smaller value may be of luck
 AIMED_RAYS = 1 << 22  # after which they stop, unless with the next ones ...
 AIMED_LIMIT = 1 << 25  # ... up to these they come to what is wanted
 SMOOTH = 1.2  # the error of aimed rays falls with this power of their number where nothing is half hidden
@@ -132,9 +133,10 @@ class SampledEstimator:
             seen, unhidden = np.moveaxis(sums / done, 1, 0)
             # what no ray has found to be hidden is a share of what is not
             found = estimate(seen, traced / max(unhidden.mean(), 1e-300))
+            is_large = found.bound > AIMED_SHARE * found.value > 0
             hoped = found.bound * (traced / AIMED_LIMIT) ** SMOOTH
             limit = AIMED_LIMIT if hoped <= AIMED_WANTED * share else AIMED_RAYS
-            if found.bound <= AIMED_WANTED * share or 2 * traced > limit:
+            if (found.bound <= AIMED_WANTED * share and not is_large) or 2 * traced > limit:
                 return found
 
     def _exchanges(self, kernel, is_target, pairs, points, first, seeds):

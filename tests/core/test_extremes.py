@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from addon.core.bake import bake
+from addon.core.emitters import emitters_of
 from addon.core.patches import subdivide
-from addon.core.scene import AreaLight, Material, PointLight
+from addon.core.radiosity import solve_radiosity
+from addon.core.scene import AreaLight, Material, PointLight, SunLight
 from addon.core.settings import BakeSettings, SettingsError
 from tests.physics.lighting import SINGLE, direct_light, floor
 from tests.scenes import Part, closed_box, cube_room, kernel_of, lamp, scene_of
@@ -41,6 +43,20 @@ def test_a_closed_room_that_absorbs_nothing_is_given_up_and_named(solver):
     assert result.corner_colours.mean() > 10 * grey.corner_colours.mean()
     assert any("reflect all light" in warning for warning in result.report.warnings)
     assert not any("reflect all light" in warning for warning in grey.report.warnings)
+
+
+def test_overshooting_leaves_no_light_below_nothing():
+    """White leaves that glow in some channels, and a sun in the others: shot too far and back until little is left."""
+    glowing = Material("glow", reflectance=(1.0, 0.8, 1.0), radiance=(1e-30, 1.0, 100.0))
+    points = np.array([(500, 0, 0), (0, 0, 0), (0, 0, 1000), (0, 500, 0), (-408, 912, 0), (-838, 0, -66)], float)
+    faces = [(1, 5, 4), (3, 1, 5), (1, 3, 0), (1, 3, 2), (0, 4, 5), (3, 5, 0)]
+    sun = SunLight("sun", direction=(1, 1, 1), irradiance=(1.0, 1e-30, 100.0), angle=1.0)
+    scene = scene_of([Part(points, faces, glowing)], (sun,))
+    with kernel_of(scene) as kernel:
+        settings = BakeSettings(method="monte-carlo", solver="progressive", error=0.5, patch_size=250.0)
+        solved = solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), settings, lambda done: None)
+    # a surface sends what it reflects of direct light, and more; single precision
+    assert (solved.solution.radiosity >= solved.patches.direct * (1 - SINGLE)).all()
 
 
 @pytest.mark.parametrize("length", [1e3, 1e7])
