@@ -67,7 +67,8 @@ def learn_guides(
 
 def _shares(moments):
     """The density that makes the variance least is the root of the mean square [Kahn & Marshall 1953]."""
-    roots = np.sqrt(moments.astype(np.float64))
+    # squares of what is as bright as may be leave float32
+    roots = np.sqrt(np.minimum(moments, np.finfo(np.float32).max).astype(np.float64))
     total = roots.sum(axis=1, keepdims=True)
     found = np.where(total > 0, roots / np.maximum(total, 1e-300), 1 / GUIDE_CELLS)
     return ((1 - EVEN) * found + EVEN / GUIDE_CELLS).astype(np.float32)

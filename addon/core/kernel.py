@@ -135,14 +135,14 @@ class KernelScene:
         self.workers.each_range(self.side_count, 4096, call)
         return out
 
-    def shoot(self, first_rays, first_samples, ray_flux, seed):
-        """Shoot fixed-point flux along each side's rays: uint64 received (side_count, 3) and escaped (3,)."""
+    def shoot(self, sides, first_samples, ray_flux, first_rays, seed):
+        """Shoot fixed-point flux along the rays of sides (K,): uint64 received (side_count, 3) and escaped (3,)."""
         received, escaped = np.zeros((self.side_count, 3), np.uint64), np.zeros((1, 3), np.uint64)
 
         def call(start, stop):
             _kernel.shoot(
-                self._scene, self._patches, first_rays, first_samples, ray_flux, start, stop - start, seed, received,
-                escaped,
+                self._scene, self._patches, sides, first_samples, ray_flux, first_rays, start, stop - start, seed,
+                received, escaped,
             )  # fmt: skip
 
         self.workers.each_range(int(first_rays[-1]), 1 << 16, call)

@@ -110,29 +110,45 @@ class _Shooting:
         self.reflectance, self.areas = reflectance, areas
         self.rays = 0
 
-    def shoot(self, flux, rays):
-        """What is reflected at once of flux (N, 3) [W] shot along rays, (N, 3), and what leaves the scene, (3,)."""
-        first_rays, per_ray, scale = _allot(flux, rays, self._rng.random())
-        received, gone = self._kernel.shoot(first_rays, self._samples, per_ray, self._seed)
-        self._samples += np.diff(first_rays).astype(np.uint32)
-        self.rays += int(first_rays[-1])
-        # in place, here and below: with millions of sides each array of theirs is 100 MB
-        reflected = received / scale
-        reflected *= self.reflectance
-        return reflected, gone / scale
-
-    def bound(self, rest):
-        """|r|_inf / (1 - max rho): a row of form factors sums to 1 at most."""
-        gain = self.reflectance.max(initial=0.0)
-        return (
-            float(np.abs(rest / np.maximum(self.areas, 1e-300)).max(initial=0.0) / (1 - gain)) if gain < 1 else np.inf
+    def shoot(self, sides, flux, rays):
+        """Shoot flux (K, 3) [W] of sides (K,) along rays: the sides where some lands (L,), what these reflect at once
+        of it (L, 3), and what leaves the scene, (3,)."""
+        shoots, first_rays, per_ray, scale = _allot(flux, rays, self._rng.random())
+        shooting = sides[shoots]
+        received, gone = self._kernel.shoot(
+            shooting.astype(np.int32), self._samples[shooting], per_ray, first_rays, self._seed
         )
+        self._samples[shooting] += np.diff(first_rays).astype(np.uint32)
+        self.rays += int(first_rays[-1])
+        landed = np.flatnonzero(received.any(axis=1))
+        reflected = received[landed] / scale
+        reflected *= self.reflectance[landed]
+        return landed, reflected, gone / scale
+
+    def shoot_all(self, flux, rays):
+        """The same for flux of all sides (N, 3): what is reflected at once (N, 3), and what leaves the scene, (3,)."""
+        sides = np.flatnonzero(flux.any(axis=1))
+        landed, reflected, gone = self.shoot(sides, flux[sides], rays)
+        of_all = np.zeros_like(flux)
+        of_all[landed] = reflected
+        return of_all, gone
+
+    def bound(self, sides, rest):
+        """Of what ``rest`` (K, 3) [W] of sides may still come to, |r|_inf / (1 - max rho): a row of form factors sums
+        to 1 at most."""
+        gain = self.reflectance.max(initial=0.0)
+        largest = float(np.abs(rest / np.maximum(self.areas[sides], 1e-300)).max(initial=0.0))
+        return largest / (1 - gain) if gain < 1 else np.inf
 
 
 def _incremental(shooting, emitted, rays, unshot_limit, on_step) -> _Run:
-    """Shoot what is unshot until little is left, or it is clear that this would take too many rays."""
-    total, unshot = emitted.copy(), emitted
-    first = float(emitted.sum())
+    """Shoot what is unshot until little is left, or it is clear that this would take too many rays.
+
+    What is unshot is kept for the sides that have some: soon these are no more than there were rays.
+    """
+    total, sides = emitted.copy(), np.flatnonzero(emitted.any(axis=1))
+    unshot = emitted[sides]
+    first = float(unshot.sum())
     residuals, escaped, absorbed, is_slow = [], 0.0, 0.0, False
     while first > 0:
         left = float(unshot.sum()) / first
@@ -144,14 +160,14 @@ def _incremental(shooting, emitted, rays, unshot_limit, on_step) -> _Run:
         is_slow = len(residuals) > LEAST_STEPS and left > REGULAR_COST * (1 - kept)
         if is_slow:
             break
-        reflected, gone = shooting.shoot(unshot, max(int(rays * left), LEAST_RAYS))
+        landed, reflected, gone = shooting.shoot(sides, unshot, max(int(rays * left), LEAST_RAYS))
         # what neither was reflected nor left was taken by surfaces, or by tinted glass
         absorbed += float(unshot.sum() - gone.sum() - reflected.sum())
         escaped += float(gone.sum())
-        total += reflected
-        unshot = reflected
+        total[landed] += reflected
+        sides, unshot = landed, reflected
     energy = Energy(first, absorbed, escaped, float(unshot.sum()))
-    return _Run(total, tuple(residuals), energy, shooting.rays, shooting.bound(unshot), is_slow)
+    return _Run(total, tuple(residuals), energy, shooting.rays, shooting.bound(sides, unshot), is_slow)
 
 
 def _regular(shootings, emitted, flux, rays, unshot_limit, on_step):
@@ -184,14 +200,14 @@ def _window(shooting, emitted, flux, rays, length):
     shot = emitted.sum(axis=0)
     sum_shot, sum_reflected, sum_escaped = np.zeros_like(emitted), np.zeros_like(emitted), np.zeros(len(shot))
     for _ in range(length):
-        reflected, gone = shooting.shoot(flux, rays)
+        reflected, gone = shooting.shoot_all(flux, rays)
         sum_shot, sum_reflected, sum_escaped = sum_shot + flux, sum_reflected + reflected, sum_escaped + gone
         flux = emitted + _scale(shot, flux, reflected) * reflected
     imbalance = np.abs(shot - (sum_shot.sum(axis=0) - sum_reflected.sum(axis=0)) / length).sum() / shot.sum()
     scale = _scale(shot, sum_shot, sum_reflected)
     total, escaped = emitted + scale * sum_reflected, float((scale * sum_escaped).sum())
     energy = Energy(float(shot.sum()), float(shot.sum()) - escaped, escaped, 0.0)
-    bound = shooting.bound(total - scale * sum_shot)
+    bound = shooting.bound(slice(None), total - scale * sum_shot)
     return _Run(total, (float(imbalance),), energy, shooting.rays, bound), flux
 
 
@@ -215,23 +231,22 @@ def _scale(shot, flux, reflected):
 
 
 def _allot(unshot, rays, offset):
-    """Rays per side in proportion to its unshot flux, by systematic sampling.
+    """Rays per side in proportion to its unshot flux (K, 3), by systematic sampling.
 
-    Returns the first ray of each side, uint64 (N + 1,), the flux of one of its rays in fixed point, uint64 (N, 3), and
-    the scale of that. Counts are rounded up or down at random, so the rays would carry a little more or less than
-    there is; each channel is scaled to carry exactly that, as a balance kept over 1 / (1 - rho) steps needs.
+    Returns which of the sides shoot (S,), the first ray of each, uint64 (S + 1,), the flux of one of its rays in fixed
+    point, uint64 (S, 3), and the scale of that. Counts are rounded up or down at random, so the rays would carry a
+    little more or less than there is; each channel is scaled to carry exactly that, as a balance kept over
+    1 / (1 - rho) steps needs.
     """
     weights = unshot @ np.ones(unshot.shape[1])
     expected = weights * (rays / weights.sum())
     bounds = np.floor(np.concatenate([[0.0], np.cumsum(expected)]) + offset)
-    first_rays = (bounds - bounds[0]).astype(np.uint64)
     counts = np.diff(bounds)
-    shoots = np.flatnonzero(counts)  # backs of walls, half of all sides, do not
+    shoots = np.flatnonzero(counts)
     counts = counts[shoots]
+    first_rays = np.concatenate([[0], np.cumsum(counts)]).astype(np.uint64)
     per_ray = unshot[shoots] / expected[shoots, None]
     carried = counts @ per_ray
     per_ray = (per_ray * (FULL / np.where(carried > 0, carried, 1.0))).astype(np.uint64)
     carried = counts @ per_ray.astype(np.float64)
-    fixed = np.zeros(unshot.shape, np.uint64)
-    fixed[shoots] = per_ray
-    return first_rays, fixed, np.where(carried > 0, carried / np.maximum(unshot.sum(axis=0), 1e-300), 1.0)
+    return shoots, first_rays, per_ray, np.where(carried > 0, carried / np.maximum(unshot.sum(axis=0), 1e-300), 1.0)

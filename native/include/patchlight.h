@@ -151,20 +151,21 @@ void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *
                  uint32_t rays, uint32_t seed, float *out_openness);
 
 /*
- * Shoot flux along rays from sides to where they land (stochastic Jacobi, Bekaert 1999).
+ * Shoot flux along rays from some sides to where they land (stochastic Jacobi, Bekaert 1999).
  *
- *   first_rays     2 * patch_count + 1: side s owns rays first_rays[s] .. first_rays[s + 1] - 1
- *   first_samples  2 * patch_count: how far each side's own sequence has been used before
- *   ray_flux       3 * 2 * patch_count: what one ray of a side carries, in fixed point: the caller scales
- *                  so that all rays together stay below 2^64 in each channel
+ *   sides          side_count of them: 2 * patch + side
+ *   first_rays     side_count + 1: sides[i] owns rays first_rays[i] .. first_rays[i + 1] - 1
+ *   first_samples  side_count: how far each side's own sequence has been used before
+ *   ray_flux       3 * side_count: what one ray of a side carries, in fixed point: the caller scales so
+ *                  that all rays together stay below 2^64 in each channel
  *   first, count   the range of rays
  *   io_received    3 * 2 * patch_count: what has landed, added to atomically; integers, so that the sum
  *                  does not depend on the order
  *   io_escaped     3: what left the scene
  */
-void pl_shoot(const pl_scene *scene, const pl_patches *patches, const uint64_t *first_rays,
-              const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count, uint32_t seed,
-              uint64_t *io_received, uint64_t *io_escaped);
+void pl_shoot(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t side_count,
+              const uint64_t *first_rays, const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first,
+              uint64_t count, uint32_t seed, uint64_t *io_received, uint64_t *io_escaped);
 
 /*
  * Where light is wanted.

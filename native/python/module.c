@@ -173,7 +173,7 @@ static PyMethodDef methods[] = {
     {"openness", door_openness, METH_VARARGS,
      "openness(scene, patches, reaches, first, count, rays, seed, out_openness)"},
     {"shoot", door_shoot, METH_VARARGS,
-     "shoot(scene, patches, first_rays, first_samples, ray_flux, first, count, seed, io_received, "
+     "shoot(scene, patches, sides, first_samples, ray_flux, first_rays, first, count, seed, io_received, "
      "io_escaped)"},
     {"gather", door_gather, METH_VARARGS,
      "gather(scene, patches, solution, lights, receivers, guides, selected, replicates, first, count, seed, io_sums) "

@@ -171,34 +171,47 @@ static bool rays_are_owned(const uint64_t *first_rays, size_t sides, uint64_t fi
     return rises && door_range_fits(first, count, first_rays[sides]);
 }
 
+/* Whether all are sides of the patches; an exception where not. */
+static bool are_sides(const int32_t *sides, size_t count, size_t side_count) {
+    for (size_t i = 0; i < count; ++i)
+        if (sides[i] < 0 || (size_t)sides[i] >= side_count) {
+            PyErr_SetString(PyExc_ValueError, "sides: an index is out of range");
+            return false;
+        }
+    return true;
+}
+
 PyObject *door_shoot(PyObject *self, PyObject *args) {
-    PyObject *capsules[2], *objects[5];
+    PyObject *capsules[2], *objects[6];
     unsigned long long first, count;
     unsigned seed;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOOOKKIOO", &capsules[0], &capsules[1], &objects[0], &objects[1], &objects[2], &first,
-                          &count, &seed, &objects[3], &objects[4]))
+    if (!PyArg_ParseTuple(args, "OOOOOOKKIOO", &capsules[0], &capsules[1], &objects[0], &objects[1], &objects[2],
+                          &objects[3], &first, &count, &seed, &objects[4], &objects[5]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = door_patches(scene, capsules[1]);
-    const Py_ssize_t sides = patches ? 2 * (Py_ssize_t)pl_patches_count(patches) : 0;
-    door_array arrays[] = {{"first_rays", 'Q', 1, sides + 1, false, {0}},
-                           {"first_samples", 'I', 1, sides, false, {0}},
-                           {"ray_flux", 'Q', 3, sides, false, {0}},
-                           {"io_received", 'Q', 3, sides, true, {0}},
+    const size_t side_count = patches ? 2 * pl_patches_count(patches) : 0;
+    door_array arrays[] = {{"sides", 'i', 1, -1, false, {0}},
+                           {"first_samples", 'I', 1, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"ray_flux", 'Q', 3, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"first_rays", 'Q', 1, -1, false, {0}},
+                           {"io_received", 'Q', 3, (Py_ssize_t)side_count, true, {0}},
                            {"io_escaped", 'Q', 3, 1, true, {0}}};
-    if (!patches || !door_arrays(objects, arrays, 5))
+    if (!patches || !door_arrays(objects, arrays, 6))
         return NULL;
-    if (!rays_are_owned(arrays[0].view.buf, (size_t)sides, first, count)) {
-        door_release(arrays, 5);
+    const size_t sides = door_rows(&arrays[0]);
+    if (!door_has_numbers(&arrays[3], sides + 1) || !are_sides(arrays[0].view.buf, sides, side_count) ||
+        !rays_are_owned(arrays[3].view.buf, sides, first, count)) {
+        door_release(arrays, 6);
         return NULL;
     }
 
     Py_BEGIN_ALLOW_THREADS
-    pl_shoot(scene, patches, arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf, first, count, seed,
-             arrays[3].view.buf, arrays[4].view.buf);
+    pl_shoot(scene, patches, arrays[0].view.buf, sides, arrays[3].view.buf, arrays[1].view.buf, arrays[2].view.buf,
+             first, count, seed, arrays[4].view.buf, arrays[5].view.buf);
     Py_END_ALLOW_THREADS
 
-    door_release(arrays, 5);
+    door_release(arrays, 6);
     Py_RETURN_NONE;
 }

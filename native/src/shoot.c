@@ -21,7 +21,7 @@ static void tint_flux(const pl_scene *scene, vec3 origin, vec3 direction, float 
         io_rgb[k] = (uint64_t)((double)io_rgb[k] * (double)fminf(through[k], 1));
 }
 
-/* The side that owns ray `ray`: the last whose first ray is not after it. */
+/* The index of the side that owns ray `ray`: of the last whose first ray is not after it. */
 static size_t owner_of_ray(const uint64_t *first_rays, size_t side_count, uint64_t ray) {
     size_t low = 0, high = side_count;
     while (high - low > 1) {
@@ -34,29 +34,29 @@ static size_t owner_of_ray(const uint64_t *first_rays, size_t side_count, uint64
     return low;
 }
 
-void pl_shoot(const pl_scene *scene, const pl_patches *patches, const uint64_t *first_rays,
-              const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first, uint64_t count, uint32_t seed,
-              uint64_t *io_received, uint64_t *io_escaped) {
-    const size_t side_count = 2 * patches->patch_count;
+void pl_shoot(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t side_count,
+              const uint64_t *first_rays, const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first,
+              uint64_t count, uint32_t seed, uint64_t *io_received, uint64_t *io_escaped) {
     if (!count)
         return;
-    size_t side = owner_of_ray(first_rays, side_count, first);
+    size_t i = owner_of_ray(first_rays, side_count, first), side = (size_t)sides[i];
     pl_side_frame frame = side_frame(scene, patches, side);
 
     for (uint64_t ray = first; ray < first + count; ++ray) {
-        if (ray >= first_rays[side + 1]) {
-            side = owner_of_ray(first_rays, side_count, ray);
+        if (ray >= first_rays[i + 1]) {
+            i = owner_of_ray(first_rays, side_count, ray);
+            side = (size_t)sides[i];
             frame = side_frame(scene, patches, side);
         }
         const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
-        const uint32_t k = first_samples[side] + (uint32_t)(ray - first_rays[side]);
+        const uint32_t k = first_samples[i] + (uint32_t)(ray - first_rays[i]);
         const vec3 origin = side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
         const vec3 direction =
             cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), frame.u, frame.v, frame.normal);
 
         const pl_hit hit = closest_hit(scene, origin, direction, 0);
         uint64_t flux[3];
-        memcpy(flux, ray_flux + 3 * side, sizeof flux);
+        memcpy(flux, ray_flux + 3 * i, sizeof flux);
         if (scene->clear.bvh)
             tint_flux(scene, origin, direction, hit.distance, flux);
         add_flux(hit.triangle < 0 ? io_escaped : io_received + 3 * hit_side(patches, &hit), flux);

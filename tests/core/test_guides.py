@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from addon.core.emitters import emitters_of
-from addon.core.guides import EVEN, GROUP, WIDEST, learn_guides, no_guides
+from addon.core.guides import EVEN, GROUP, WIDEST, _shares, learn_guides, no_guides
 from addon.core.kernel import GUIDE_CELLS
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
@@ -104,6 +104,15 @@ def test_shares_are_a_density_that_leaves_nothing_out():
     assert guides.shares.sum(axis=1) == pytest.approx(1, abs=1e-5)  # 64 float32 additions
     assert guides.shares.min() >= 0.999 * EVEN / GUIDE_CELLS
     assert (guides.groups >= 0).all()
+
+
+def test_what_is_too_bright_to_square_is_shared_as_the_brightest():
+    moments = np.full((1, GUIDE_CELLS), 1e38, np.float32)
+    moments[0, ::2] = np.inf
+    with np.errstate(invalid="raise"):
+        shares = _shares(moments)
+    assert shares.sum() == pytest.approx(1, abs=1e-5)  # 64 float32 additions
+    assert (shares[0, ::2] > shares[0, 1::2]).all()
 
 
 def test_groups_are_near():

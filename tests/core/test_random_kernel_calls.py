@@ -142,21 +142,25 @@ def test_all_flux_that_is_shot_lands_or_leaves(data):
     if kernel is None:
         return
     scene, patches, count = kernel
-    runs = arrays(data.draw, 2 * count, np.int64, st.sampled_from((0, 0, 1, 5)))
+    shooting = data.draw(counts)
+    known = st.integers(0, max(2 * count - 1, 0))
+    sides = arrays(data.draw, shooting, np.int32, known if data.draw(st.integers(0, 5)) else numbers)
+    runs = arrays(data.draw, shooting, np.int64, st.sampled_from((0, 0, 1, 5)))
     first_rays = np.concatenate([[0], np.cumsum(runs)]).astype(np.uint64)
     if not data.draw(st.integers(0, 5)):
         first_rays[-1] = data.draw(st.sampled_from((1, 1000)))
-    flux = np.full((2 * count, 3), data.draw(st.sampled_from((0, 1, 1 << 40))), np.uint64)
+    flux = np.full((shooting, 3), data.draw(st.sampled_from((0, 1, 1 << 40))), np.uint64)
     received, escaped = np.zeros((2 * count, 3), np.uint64), np.zeros((1, 3), np.uint64)
     first, many = (abs(data.draw(numbers)) for _ in range(2))
-    used = arrays(data.draw, 2 * count, np.uint32, st.sampled_from((0, 3, (1 << 32) - 1)))
+    used = arrays(data.draw, shooting, np.uint32, st.sampled_from((0, 3, (1 << 32) - 1)))
     try:
-        _kernel.shoot(scene, patches, first_rays, used, flux, first, many, data.draw(seeds), received, escaped)
+        _kernel.shoot(scene, patches, sides, used, flux, first_rays, first, many, data.draw(seeds), received, escaped)
     except ValueError:
         rises = first_rays[0] == 0 and (np.diff(first_rays.astype(np.int64)) >= 0).all()
-        assert first + many > first_rays[-1] or not rises
+        are_sides = ((sides >= 0) & (sides < 2 * count)).all()
+        assert first + many > first_rays[-1] or not rises or not are_sides
         return
-    shot = many * int(flux[0, 0]) if count else 0
+    shot = many * int(flux[0, 0]) if shooting else 0
     # tinted glass takes some
     assert int(received[:, 0].sum()) + int(escaped[0, 0]) <= shot
 

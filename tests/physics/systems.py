@@ -33,10 +33,10 @@ class RaysByChance:
         self._shares = np.concatenate([np.maximum(matrix, 0.0), np.where(escaping < 1e-12, 0.0, escaping)], axis=1)
         self._shares /= self._shares.sum(axis=1, keepdims=True)
 
-    def shoot(self, first_rays, first_samples, ray_flux, seed):
+    def shoot(self, sides, first_samples, ray_flux, first_rays, seed):
         """As kernel.KernelScene.shoot: uint64 received (N, 3) and escaped (3,)."""
         rng = np.random.default_rng([seed, *first_samples[:4]])
-        landed = rng.multinomial(np.diff(first_rays.astype(np.int64)), self._shares).astype(np.uint64)
+        landed = rng.multinomial(np.diff(first_rays.astype(np.int64)), self._shares[sides]).astype(np.uint64)
         received = landed.T @ ray_flux
         return received[:-1], received[-1]
 
