@@ -54,7 +54,7 @@ def _radius(corners):
 
 def aimed_exchanges(kernel: KernelScene, is_target, pairs, rays, first, seeds):
     """A_i F_ij [m^2] of all pairs of parts together, one estimate for each seed: float64 (len(seeds), 2), as it is and
-    as it would be if nothing stood between.
+    as it would be if nothing stood between; and the rays traced.
 
     ``rays`` from each pair, after the ``first`` ones; ``is_target`` bool (T,) of the kernel scene's triangles.
     """
@@ -63,7 +63,7 @@ def aimed_exchanges(kernel: KernelScene, is_target, pairs, rays, first, seeds):
         return sum(_exchange(kernel, is_target, *pairs[k], rays, first, [len(pairs) * s + k for s in seeds])
                    for k in range(start, stop))  # fmt: skip
 
-    return sum(kernel.workers.each_range(len(pairs), 1, exchanges))
+    return sum(kernel.workers.each_range(len(pairs), 1, exchanges)), len(seeds) * len(pairs) * rays
 
 
 def _exchange(kernel, is_target, emitter, target, rays, first, seeds):

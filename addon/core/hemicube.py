@@ -33,13 +33,13 @@ def pairs_seen(emitter_pieces, target_pieces):
 
 def hemicube_exchanges(kernel: KernelScene, is_target, pairs, resolution, positions, first, seeds):
     """A_i F_ij [m^2] of all pairs of parts together, one estimate for each seed: float64 (len(seeds), 2), as it is and
-    as it would be if nothing stood between.
+    as it would be if nothing stood between; and the rays traced.
 
     ``positions`` on each emitter, after the ``first`` ones, with ``resolution``^2 pixels over what the target covers of
     each of a hemicube's five faces; ``is_target`` bool (T,) of the kernel scene's triangles.
     """
 
-    found = np.empty((len(pairs) * len(seeds), 2))
+    found = np.empty((len(pairs) * len(seeds), 3))
 
     def exchanges(start, stop):
         for job in range(start, stop):
@@ -49,11 +49,11 @@ def hemicube_exchanges(kernel: KernelScene, is_target, pairs, resolution, positi
             found[job] = _exchange(kernel, is_target, *pairs[k], resolution, positions, first, seed)
 
     kernel.workers.each_range(len(found), 1, exchanges)
-    return found.reshape(len(pairs), len(seeds), 2).sum(axis=0)
+    return found[:, :2].reshape(len(pairs), len(seeds), 2).sum(axis=0), int(found[:, 2].sum())
 
 
 def _exchange(kernel, is_target, emitter, target, resolution, positions, first, seed):
-    normal, sums = unit_normal(emitter), np.zeros(2)
+    normal, sums = unit_normal(emitter), np.zeros(3)
     for points in _points(first, positions, max(1, PIXELS_AT_ONCE // resolution**2), seed):
         origins = points_on(emitter, points[:, :2])
         sums += _seen_from(kernel, is_target, origins, normal, target, resolution, points[:, 2:])
@@ -62,7 +62,7 @@ def _exchange(kernel, is_target, emitter, target, resolution, positions, first, 
         whole += element_factors(points_on(emitter, points[:, :2]), normal, target).sum()
     whole *= polygon_area(emitter) / count
     # pixels at the target's edge are in or out, which errs for what is seen as for what is covered
-    return (whole if sums[0] == sums[1] else sums[0] / sums[1] * whole), whole
+    return (whole if sums[0] == sums[1] else sums[0] / sums[1] * whole), whole, sums[2]
 
 
 def _points(first, count, together, seed):
@@ -72,8 +72,9 @@ def _points(first, count, together, seed):
 
 
 def _seen_from(kernel, is_target, origins, normal, target, resolution, places):
-    """Sums of the delta form factors of pixels that see the target, and of those that it covers, float64 (2,)."""
-    frame, corners, sums = _frame(normal), target - origins[:, None], np.zeros(2)
+    """Sums of the delta form factors of pixels that see the target, and of those that it covers, and how many these
+    are, float64 (3,)."""
+    frame, corners, sums = _frame(normal), target - origins[:, None], np.zeros(3)
     for face in (TOP, *SIDES):
         directions, deltas, owners = _covered_pixels(corners @ (frame @ face), face, resolution, places)
         along = directions @ (frame @ face).T
@@ -81,7 +82,7 @@ def _seen_from(kernel, is_target, origins, normal, target, resolution, places):
         heights = corners[owners, 0] @ unit_normal(target)
         along *= (heights / (along @ unit_normal(target)))[:, None]
         seen = are_visible(kernel, is_target, origins[owners], normal, along)
-        sums += (deltas * seen).sum(), deltas.sum()
+        sums += (deltas * seen).sum(), deltas.sum(), len(deltas)
     return sums
 
 

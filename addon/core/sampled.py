@@ -123,20 +123,21 @@ class SampledEstimator:
         seeds, scale = [self.seed + k for k in range(REPLICATES)], share / emitter.area
         rays_each = 1 if self.name == "monte-carlo" else self.resolution**2
         points = max(1, FIRST_RAYS // (REPLICATES * len(pairs) * rays_each))
-        points, done, sums = 1 << (points - 1).bit_length(), 0, 0.0
+        points, done, sums, traced = 1 << (points - 1).bit_length(), 0, 0.0, 0
         while True:
             # a whole power of two is even all over: the first points and as many again
-            sums = sums + points * scale * self._exchanges(kernel, owners == 0, pairs, points, done, seeds)
+            found, rays = self._exchanges(kernel, owners == 0, pairs, points, done, seeds)
+            sums, traced = sums + points * scale * found, traced + rays
             done += points
             points = done
-            traced = REPLICATES * len(pairs) * done * rays_each
+            work = REPLICATES * len(pairs) * done * rays_each
             seen, unhidden = np.moveaxis(sums / done, 1, 0)
             # what no ray has found to be hidden is a share of what is not
-            found = estimate(seen, traced / max(unhidden.mean(), 1e-300))
+            found = estimate(seen, max(traced, 1) / max(unhidden.mean(), 1e-300))
             is_large = found.bound > AIMED_SHARE * found.value > 0
-            hoped = found.bound * (traced / AIMED_LIMIT) ** SMOOTH
+            hoped = found.bound * (work / AIMED_LIMIT) ** SMOOTH
             limit = AIMED_LIMIT if hoped <= AIMED_WANTED * share else AIMED_RAYS
-            if (found.bound <= AIMED_WANTED * share and not is_large) or 2 * traced > limit:
+            if (found.bound <= AIMED_WANTED * share and not is_large) or 2 * work > limit:
                 return found
 
     def _exchanges(self, kernel, is_target, pairs, points, first, seeds):
