@@ -30,6 +30,7 @@ COARSE_RAYS = 1 << 22  # of a row, where only a solution is wanted: its errors a
 FIRST_RAYS = 1 << 18  # of all replicates together
 AIMED_WANTED = 4e-7  # bound of the error at which aimed rays stop
 AIMED_SHARE = 1e-2  # of the value, which it must be as well: a small bound of a smaller value may be of luck
+GRAZED = 1e-5  # of what nothing would hide: a value below this may be of rays that slip past an edge
 AIMED_RAYS = 1 << 22  # after which they stop, unless with the next ones ...
 AIMED_LIMIT = 1 << 25  # ... up to these they come to what is wanted
 SMOOTH = 1.2  # the error of aimed rays falls with this power of their number where nothing is half hidden
@@ -134,11 +135,13 @@ class SampledEstimator:
             seen, unhidden = np.moveaxis(sums / done, 1, 0)
             # what no ray has found to be hidden is a share of what is not
             found = estimate(seen, max(traced, 1) / max(unhidden.mean(), 1e-300))
-            is_large = found.bound > AIMED_SHARE * found.value > 0
+            is_large = found.bound > AIMED_SHARE * found.value > AIMED_SHARE * GRAZED * unhidden.mean()
             hoped = found.bound * (work / AIMED_LIMIT) ** SMOOTH
             limit = AIMED_LIMIT if hoped <= AIMED_WANTED * share else AIMED_RAYS
             if (found.bound <= AIMED_WANTED * share and not is_large) or 2 * work > limit:
-                return found
+                # blockers' edges are as good as float32
+                blurred = PUSH * unhidden.mean() if (seen < unhidden).any() else 0.0
+                return replace(found, bound=found.bound + blurred)
 
     def _exchanges(self, kernel, is_target, pairs, points, first, seeds):
         if self.name == "monte-carlo":
