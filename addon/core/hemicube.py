@@ -13,7 +13,7 @@ import numpy as np
 from .aimed import are_visible, points_on
 from .kernel import KernelScene, sobol_points
 from .lambert import element_factors
-from .polygon import above, fault_of, polygon_area, unit_normal
+from .polygon import above, fault_of, polygon_area, tangents, unit_normal
 from .visibility import clip_all
 
 PAIRS_LIMIT = 16  # of convex parts; more are seen at once by the pixels of one whole hemicube
@@ -74,7 +74,8 @@ def _points(first, count, together, seed):
 def _seen_from(kernel, is_target, origins, normal, target, resolution, places):
     """Sums of the delta form factors of pixels that see the target, and of those that it covers, and how many these
     are, float64 (3,)."""
-    frame, corners, sums = _frame(normal), target - origins[:, None], np.zeros(3)
+    frame = np.stack([*tangents(normal), normal], axis=1)
+    corners, sums = target - origins[:, None], np.zeros(3)
     for face in (TOP, *SIDES):
         directions, deltas, owners = _covered_pixels(corners @ (frame @ face), face, resolution, places)
         along = directions @ (frame @ face).T
@@ -84,14 +85,6 @@ def _seen_from(kernel, is_target, origins, normal, target, resolution, places):
         seen = are_visible(kernel, is_target, origins[owners], normal, along)
         sums += (deltas * seen).sum(), deltas.sum(), len(deltas)
     return sums
-
-
-def _frame(normal):
-    """Columns u, v, normal."""
-    helper = np.eye(3)[np.argmin(np.abs(normal))]
-    u = np.cross(helper, normal)
-    u /= np.linalg.norm(u)
-    return np.stack([u, np.cross(normal, u), normal], axis=1)
 
 
 def _covered_pixels(corners, face, resolution, places):

@@ -135,6 +135,14 @@ def _is_ear(corners, left, k, normal):
     return not inside.any()
 
 
+def tangents(normal):
+    """Two unit vectors (3,) that make a right-handed frame with a unit normal after them."""
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    u = np.cross(helper, normal)
+    u /= np.linalg.norm(u)
+    return u, np.cross(normal, u)
+
+
 def heights_above(corners, origin, normal):
     """Heights of corners (K, 3) over a plane [m]; what is nearer than rounding lies in it and has height 0."""
     heights = (corners - origin) @ normal

@@ -15,7 +15,17 @@ from .bodies import PANEL_ERROR, Body
 from .hemicube import hemicube_exchanges, pairs_seen
 from .kernel import KernelScene
 from .patches import subdivide
-from .polygon import are_coplanar, bisect, distance_to, extent, fault_of, heights_above, polygon_area, unit_normal
+from .polygon import (
+    are_coplanar,
+    bisect,
+    distance_to,
+    extent,
+    fault_of,
+    heights_above,
+    polygon_area,
+    tangents,
+    unit_normal,
+)
 from .quadrature import fan
 from .scene import Material, Scene, SceneObject
 from .transport import REPLICATES, Estimate, HemicubeFormFactors, MonteCarloFormFactors, estimate, replicated
@@ -127,21 +137,21 @@ class SampledEstimator:
         points, done, sums, traced = 1 << (points - 1).bit_length(), 0, 0.0, 0
         while True:
             # a whole power of two is even all over: the first points and as many again
-            found, rays = self._exchanges(kernel, owners == 0, pairs, points, done, seeds)
-            sums, traced = sums + points * scale * found, traced + rays
+            exchanged, rays = self._exchanges(kernel, owners == 0, pairs, points, done, seeds)
+            sums, traced = sums + points * scale * exchanged, traced + rays
             done += points
             points = done
             work = REPLICATES * len(pairs) * done * rays_each
             seen, unhidden = np.moveaxis(sums / done, 1, 0)
             # what no ray has found to be hidden is a share of what is not
             found = estimate(seen, max(traced, 1) / max(unhidden.mean(), 1e-300))
-            is_large = found.bound > AIMED_SHARE * found.value > AIMED_SHARE * GRAZED * unhidden.mean()
+            is_large = found.bound > AIMED_SHARE * found.value and found.value > GRAZED * unhidden.mean()
             hoped = found.bound * (work / AIMED_LIMIT) ** SMOOTH
             limit = AIMED_LIMIT if hoped <= AIMED_WANTED * share else AIMED_RAYS
             if (found.bound <= AIMED_WANTED * share and not is_large) or 2 * work > limit:
                 # blockers' edges are as good as float32
-                blurred = PUSH * unhidden.mean() if (seen < unhidden).any() else 0.0
-                return replace(found, bound=found.bound + blurred)
+                slipped = PUSH * unhidden.mean() if (seen < unhidden).any() else 0.0
+                return replace(found, bound=found.bound + slipped)
 
     def _exchanges(self, kernel, is_target, pairs, points, first, seeds):
         if self.name == "monte-carlo":
@@ -293,9 +303,6 @@ def _scene_about(centre, triangles):
 
 
 def _triangle_at(point, normal, size):
-    helper = np.eye(3)[np.argmin(np.abs(normal))]
-    u = np.cross(helper, normal)
-    u /= np.linalg.norm(u)
-    v = np.cross(normal, u)
+    u, v = tangents(normal)
     turns = 2 * np.pi * np.arange(3) / 3
     return point + size * (np.cos(turns)[:, None] * u + np.sin(turns)[:, None] * v)
