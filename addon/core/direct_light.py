@@ -51,9 +51,9 @@ def first_direct(trace: Callable, error: float, seed: int, on_step: Callable[[fl
 
 
 def refined_direct(
-    first: DirectLight, trace: Callable, pooled: Callable, scale, error: float, seed: int, on_step
+    first: DirectLight, trace: Callable, pooled: Callable, scale, weights, error: float, seed: int, on_step
 ) -> DirectLight:
-    """Direct light whose noise comes to ``SHARE`` of the error, relative to ``scale`` (N,), the RMS over receivers.
+    """Direct light whose noise comes to ``SHARE`` of the error, relative to ``scale`` (N,), RMS by ``weights`` (N,).
 
     ``pooled`` averages (N,) over neighbours: two replicates agree by chance as often as not, and all of their rays may
     miss a lamp that is seen through a gap.
@@ -62,7 +62,7 @@ def refined_direct(
     rays = first.rays
     for attempt in range(1, PASSES + 1):
         of_one_ray = np.minimum(variance / scale**2, 1.0) * samples
-        noise = np.sqrt(np.minimum(pooled(of_one_ray) / samples, 1.0))
+        noise = np.sqrt(weights * np.minimum(pooled(of_one_ray) / samples, 1.0))
         if np.sqrt(np.mean(noise**2)) <= SHARE * error:
             break
         due = np.minimum(rays_due(noise, samples, SHARE * error), MOST_SAMPLES)

@@ -37,7 +37,7 @@ MOST_IDLE = 2  # the noise
 AIM = 0.95  # of the target: what receivers are due is an estimate
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
 SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
-MOST_EXTRA = 2  # passes after that, each with four times the rays: speckles are gone by then
+MOST_EXTRA = 1  # pass after that, with four times the rays: few speckles are left by then
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
@@ -53,7 +53,8 @@ class Irradiance:
     Attributes
     ----------
     values : float32 (N, 3) E [W/m^2]
-    relative_error : estimated RMS over receivers of the error over (E + 0.3 median E), luminance
+    relative_error : estimated RMS of the error over (E + 0.3 median E), luminance: over receivers, of a lightmap by how
+        much of the surface looks each up
     seen_error : the same at random points of the surfaces, looked up in the result as a viewer does
     target_reached : whether sampling met its target
     stopped : what ended it, "" where nothing was left to do
@@ -82,13 +83,23 @@ class _Job:
     kernel: KernelScene
     solved: Solved
     receivers: Receivers
+    weights: np.ndarray  # (N,) of a receiver's squared error in the mean of all, 1 in the mean
     guides: Guides
     texel_light: TexelLight = NO_TEXEL_LIGHT
     denoise: Callable | None = None
 
     def part(self, chosen) -> _Job:
         """The same for some of the receivers."""
-        return replace(self, receivers=self.receivers.part(chosen), guides=self.guides.part(chosen))
+        return replace(
+            self,
+            receivers=self.receivers.part(chosen),
+            weights=self.weights[chosen],
+            guides=self.guides.part(chosen),
+        )
+
+    def at(self, receivers: Receivers) -> _Job:
+        """The same light at other receivers."""
+        return replace(self, receivers=receivers, weights=np.ones(len(receivers)), guides=no_guides(len(receivers)))
 
     def looking_further(self, factor) -> _Job:
         """The same with less taken for granted of what rays hit."""
@@ -134,7 +145,7 @@ def gather_irradiance(
     solved : the patches' reflected light, and what direct light is sampled from
     grid : the texels that the receivers are, over which gathered light is smoothed; None = no smoothing
     seen : random points of the surfaces, at which the result is looked up
-    error : target of the relative error of every receiver [1]
+    error : target of the relative error [1]
     denoise : a denoiser.Denoiser, or None
     seconds_left : () -> float, until the time limit [s]; the first pass is always finished
     on_step : (0..1) -> None
@@ -142,14 +153,14 @@ def gather_irradiance(
     if not len(receivers):
         nothing = {"direct": 0, "gather": 0, "probe": 0}
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
-    job = _Job(kernel, solved, receivers, no_guides(len(receivers)), denoise=denoise if grid else None)
+    weights = grid.shown if grid else np.ones(len(receivers), np.float32)
+    job = _Job(kernel, solved, receivers, weights, no_guides(len(receivers)), denoise=denoise if grid else None)
     direct, look, looks = _first_look(job, grid, error, seed, on_step)
     if grid is not None:
         job = _with_texel_light(job, grid, direct.values, look)
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     gathered = _gather_until(replace(job, guides=guides), grid, direct.values, error, seed, seconds_left, on_step)
-    of_points = replace(gathered.job, receivers=seen.receivers, guides=no_guides(len(seen.receivers)))
-    at_points = _measure(of_points.looking_further(FURTHER), error, seed + 5)
+    at_points = _measure(gathered.job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
     shown = seen.look_up(gathered.values)
     seen_error = rms_of(at_points.squares_of(shown, scale_of(shown)))
     traced = {
@@ -177,7 +188,9 @@ def _first_look(job: _Job, grid: TexelGrid | None, error, seed, on_step):
     means, _, rays = _gathered(job, LOOK_RAYS, seed + 2, lambda done: on_step(0.1 + 0.1 * done))
     look = means.mean(axis=1) if grid is None else blurred(job.kernel.workers, grid, job.receivers, means)
     scale = scale_of(first.values + look)
-    direct = refined_direct(first, trace, over_neighbours, scale, error, seed, lambda done: on_step(0.2 + 0.2 * done))
+    direct = refined_direct(
+        first, trace, over_neighbours, scale, job.weights, error, seed, lambda done: on_step(0.2 + 0.2 * done)
+    )
     return direct, look, rays
 
 
@@ -251,7 +264,7 @@ def _denoised(job: _Job, grid, found: _Found, means, direct, chosen, probes) -> 
         return found
     gathered = means.mean(axis=1, dtype=np.float32)
     values = denoised(job.denoise, grid, found.values, direct, gathered, chosen, probes)
-    squares = probes.squares_of(values[chosen], scale_of(values)[chosen])
+    squares = job.weights[chosen] * probes.squares_of(values[chosen], scale_of(values)[chosen])
     return _Found(values, squares, True) if rms_of(squares) < rms_of(found.squares) else found
 
 
@@ -335,7 +348,7 @@ def _best_estimate(job, grid, means, near, taken, direct, chosen, probes):
     for gathered, noise in estimates:
         values = (direct + gathered).astype(np.float32)
         scale = scale_of(values)
-        squares = probes.squares_of(values[chosen], scale[chosen])
+        squares = job.weights[chosen] * probes.squares_of(values[chosen], scale[chosen])
         if best is None or rms_of(squares) < rms_of(best[0].squares):
-            best = _Found(values, squares, False), np.sqrt(noise) / scale
+            best = _Found(values, squares, False), np.sqrt(job.weights * noise) / scale
     return best

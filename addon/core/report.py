@@ -33,7 +33,8 @@ class Report:
     method, solver : what ran, after "auto" has chosen; ``choice`` says why
     residuals : the solver's residual after each step, relative to the first
     denoiser : what took noise away in the end, with its version, or "none" and why
-    estimated_error : local relative RMS error of the irradiance at the receivers, which more rays make smaller
+    estimated_error : local relative RMS error of the irradiance at the receivers, which more rays make smaller; of a
+        lightmap's each by how much of the surface looks it up
     seen_error : the same at random points of the surfaces, looked up in the result as a viewer does: with the size of
         texels, or the distance of vertices, and of patches
     target_error : what was asked for

@@ -35,12 +35,14 @@ class TexelGrid:
     spacing : distance of neighbouring texels in space, the median [m]
     uvs : float32 (T, 3, 2) of the scene's triangles' corners, in texels; NaN without a place
     reflectance : float32 (N, 3) of the receivers
+    shown : float32 (N,) how much of the surface looks each receiver up, relative to the mean
     """
 
     receivers: np.ndarray
     spacing: float
     uvs: np.ndarray
     reflectance: np.ndarray
+    shown: np.ndarray
 
 
 def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Receivers) -> TexelGrid:
@@ -53,7 +55,7 @@ def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Rec
     apart = apart[apart > 0]
     spacing = float(np.median(apart)) if len(apart) else 1.0
     colours = textured_colours(scene, texel_map.triangles, texel_map.barycentrics, "reflectance", "reflectance_texture")
-    return TexelGrid(grid, spacing, charts.uvs, np.clip(colours, 0, 1))
+    return TexelGrid(grid, spacing, charts.uvs, np.clip(colours, 0, 1), texel_map.shown)
 
 
 def blurred(workers: Workers, grid: TexelGrid, receivers: Receivers, means):

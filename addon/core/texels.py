@@ -11,6 +11,7 @@ from .charts import Charts
 from .z_order import z_order
 
 INSET = 0.25  # texels inside a chart's edge, for texels whose centres are outside; half-way where a triangle is thinner
+LEAST_SHOWN = 1 / 32  # texels, of which only corners of charts are looked up: noise there matters little, not nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +27,7 @@ class TexelMap:
     rows, columns : int32 (N,) of the texels; row 0 is at v = 0
     triangles : int32 (N,) the scene's triangle that the receiver is on
     barycentrics : float32 (N, 3) where on it
-    is_inside : bool (N,) the texel's centre is inside the chart
+    distances : float32 (N,) from the texel's centre to the chart, 0 inside [texels]
     width, height : of the lightmap [texels]
     """
 
@@ -34,12 +35,29 @@ class TexelMap:
     columns: np.ndarray
     triangles: np.ndarray
     barycentrics: np.ndarray
-    is_inside: np.ndarray
+    distances: np.ndarray
     width: int
     height: int
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    @property
+    def is_inside(self):
+        """Whether texels' centres are inside the chart: bool (N,)."""
+        return self.distances == 0
+
+    @property
+    def shown(self):
+        """How much of the surface is looked up in each texel, of a mean of 1: float32 (N,).
+
+        Bilinear lookup spreads a texel over a hat of area 1, of which a straight edge at a distance d from its centre
+        leaves (1 - d)^2 / 2. The rim of a chart is a tenth of the texels and a fiftieth of what is seen; it lies in
+        corners and contacts, where light costs most rays.
+        """
+        rim = np.maximum(0.5 * np.maximum(1 - self.distances, 0) ** 2, LEAST_SHOWN)
+        areas = np.where(self.is_inside, 1, rim).astype(np.float32)
+        return areas / max(areas.mean(), LEAST_SHOWN) if len(areas) else areas
 
 
 def texels(charts: Charts) -> TexelMap:
@@ -48,12 +66,12 @@ def texels(charts: Charts) -> TexelMap:
     rows, columns = np.nonzero(triangles >= 0)
     order = np.argsort(z_order(columns, rows))
     rows, columns = rows[order], columns[order]
-    triangles, weights, is_inside = triangles[rows, columns], barycentrics[rows, columns], distances[rows, columns] == 0
-    outside = np.flatnonzero(~is_inside)
+    triangles, weights, distances = triangles[rows, columns], barycentrics[rows, columns], distances[rows, columns]
+    outside = np.flatnonzero(distances)
     centres = np.stack([columns, rows], axis=1)[outside] + 0.5
     weights[outside] = further_in(charts.uvs[triangles[outside]].astype(np.float64), centres, weights[outside])
     return TexelMap(
-        rows.astype(np.int32), columns.astype(np.int32), triangles, weights, is_inside, charts.width, charts.height
+        rows.astype(np.int32), columns.astype(np.int32), triangles, weights, distances, charts.width, charts.height
     )
 
 

@@ -99,7 +99,8 @@ def test_a_bake_with_it_is_no_worse_at_points_that_did_not_judge_it(library):
 
 def four_texels():
     receivers = np.arange(4, dtype=np.int32).reshape(2, 2)
-    grid = TexelGrid(receivers, 1.0, np.zeros((0, 3, 2), np.float32), np.ones((4, 3), np.float32))
+    ones = np.ones((4, 3), np.float32)
+    grid = TexelGrid(receivers, 1.0, np.zeros((0, 3, 2), np.float32), ones, ones[:, 0])
     direct = np.array([[0.0] * 3, [1.0] * 3, [0.5] * 3, [0.5] * 3], np.float32)
     gathered = np.array([[0.0] * 3, [0.0] * 3, [0.2] * 3, [0.2] * 3], np.float32)
     return grid, direct, gathered

@@ -26,7 +26,7 @@ class Lamp:
         return grey.astype(np.float32), variance.astype(np.float32), len(spread) * samples
 
 
-def run(deviation, error, scale=LIGHT):
+def run(deviation, error, scale=LIGHT, weights=1.0):
     lamp, told = Lamp(deviation), []
     first = first_direct(lamp, error, 1, told.append)
     assert told == [0.5, 1.0]
@@ -35,7 +35,8 @@ def run(deviation, error, scale=LIGHT):
     def over_neighbours(noise):
         return pooled(None, None, None, noise)
 
-    found = refined_direct(first, lamp, over_neighbours, np.full(COUNT, scale), error, 1, told.append)
+    ones = np.ones(COUNT)
+    found = refined_direct(first, lamp, over_neighbours, scale * ones, weights * ones, error, 1, told.append)
     assert told == sorted(told)
     assert all(0 < done < 1 for done in told)
     return lamp, first, found
@@ -68,3 +69,13 @@ def test_what_is_calm_among_its_neighbours_gets_no_more_rays():
 def test_noise_that_other_light_hides_is_left_alone():
     _, first, found = run(penumbra(), 0.05, scale=100 * LIGHT)
     assert (found.samples == first.samples).all()
+
+
+def test_noise_counts_by_how_much_of_it_is_seen():
+    """A penumbra's rays go as the root of its weight [Neyman 1934]: a sixteenth has a quarter."""
+    deviation, weights = np.full(COUNT, 2.0), np.where(np.arange(COUNT) < COUNT // 2, 1.0, 1 / 16)
+    _, first, found = run(deviation, 0.02, weights=weights)
+    seen, hardly = (found.samples[part].mean() for part in (slice(16, COUNT // 2 - 16), slice(COUNT // 2 + 16, -16)))
+    # powers of two, at least of the first look; a pooled chi square of ten moves some of them to the next
+    assert seen > first.samples[0]
+    assert 2 < seen / hardly < 8

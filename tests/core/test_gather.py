@@ -1,5 +1,7 @@
 """Irradiance at receivers: the error that is stated is the error that is there, and sampling stops when it is met."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,10 @@ from addon.core.direct_light import shadow_samples
 from addon.core.emitters import LUMINANCE
 from addon.core.receivers import surface_receivers
 from addon.core.scene import AreaLight
+from addon.core.settings import BakeSettings
+from addon.core.smoothing import texel_grid
+from addon.core.texels import texels
+from addon.core.unwrap import unwrap
 from tests.physics.lighting import full_light
 from tests.scenes import closed_box, cornell_box, room_with_occluder
 
@@ -64,6 +70,23 @@ def test_the_same_bytes_at_any_number_of_threads():
         assert other.values.tobytes() == first.values.tobytes()
         assert other.relative_error == first.relative_error
         assert other.rays == first.rays
+
+
+def test_texels_that_nobody_looks_up_get_no_further_rays():
+    """The same lightmap with half of its texels out of sight: the other half comes to the error that is asked for."""
+    scene = cornell_box()
+    settings = BakeSettings(texels=4096)
+    charts = unwrap(scene, settings)
+    texel_map = texels(charts)
+    receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
+    grid = texel_grid(scene, charts, texel_map, receivers)
+    is_seen = receivers.positions[:, 0] > np.median(receivers.positions[:, 0])
+    half = replace(grid, shown=(2 * np.where(is_seen, 1 - 1e-6, 1e-6)).astype(np.float32))
+    whole, part = (light_of(scene, receivers, error=0.03, grid=which)[0] for which in (grid, half))
+    assert whole.relative_error <= 0.03
+    assert part.relative_error <= 0.03
+    # the first pass is everyone's, and the mean of the half is over half as many: its own rays stay about the same
+    assert part.rays["gather"] < 0.8 * whole.rays["gather"]
 
 
 def test_no_receivers_no_light():

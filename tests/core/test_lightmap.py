@@ -20,7 +20,7 @@ def map_of(rows, columns, width, height):
         np.asarray(columns, np.int32),
         np.zeros(count, np.int32),
         np.full((count, 3), 1 / 3, np.float32),
-        np.ones(count, bool),
+        np.zeros(count, np.float32),
         width,
         height,
     )

@@ -21,7 +21,8 @@ def wall(side=SIDE, heights=None, normals=None):
     facing = np.tile(np.float32([0, 0, 1]), (side * side, 1)) if normals is None else normals
     receivers = Receivers(SPACING * np.stack([x, y, z / SPACING], 1), facing, np.zeros(side * side, np.int32))
     nowhere = np.full((1, 3, 2), np.nan, np.float32)
-    return TexelGrid(grid, SPACING, nowhere, np.ones((side * side, 3), np.float32)), receivers
+    ones = np.ones((side * side, 3), np.float32)
+    return TexelGrid(grid, SPACING, nowhere, ones, ones[:, 0]), receivers
 
 
 def noisy(light, deviation, seed=1):

@@ -126,6 +126,26 @@ def test_a_lightmap_without_texels_is_refused(width, height):
         _kernel.rasterise_texels(np.zeros((1, 3, 2), np.float32), width, height, *empty)
 
 
+def test_how_much_is_looked_up_in_texels_is_what_their_hats_leave_of_a_chart():
+    """Against the integral of each texel's hat over a quad, at its middle rows; corners are looked up less."""
+    low, high = 2.2, 11.9
+    quad = np.float32([[[low, low], [high, low], [high, high]], [[low, low], [high, high], [low, high]]])
+    found = texels(Charts(quad, np.zeros(2, np.int32), 14, 14))
+    fine = np.linspace(low, high, 20001)
+    fine = 0.5 * (fine[1:] + fine[:-1])
+    across = {c: np.maximum(1 - np.abs(fine - c - 0.5), 0).sum() * (high - low) / 20000 for c in range(14)}
+    middle = np.flatnonzero(found.rows == 7)
+    exact = np.array([across[c] for c in found.columns[middle].tolist()])
+    inside = found.is_inside[middle]
+    shown = found.shown[middle] / found.shown.max()
+    # 20000 steps of a kinked integrand: 1e-6; inside a whole texel is taken, which at the very edge is half of one
+    assert shown[~inside] == pytest.approx(exact[~inside], abs=1e-5)
+    assert (~inside).sum() == 2
+    assert ((shown[inside] >= exact[inside] - 1e-6) & (exact[inside] >= 0.5)).all()
+    assert found.shown.mean() == pytest.approx(1, abs=1e-5)  # float32
+    assert found.shown.min() > 0
+
+
 @given(
     st.lists(st.tuples(st.floats(1, 15), st.floats(1, 15)), min_size=3, max_size=12).map(lambda c: c[: len(c) // 3 * 3])
 )

@@ -40,8 +40,8 @@ def direct_light(lights, points, parts=(), samples=64, seed=0, threads=1):
     return values.astype(np.float64), variance.astype(np.float64)
 
 
-def full_light(scene, receivers, threads=2, **settings):
-    """Irradiance of the whole pipeline at receivers, without a lightmap: a gather.Irradiance, and the Solved."""
+def full_light(scene, receivers, threads=2, grid=None, **settings):
+    """Irradiance of the whole pipeline at receivers: a gather.Irradiance, and the Solved. ``grid``: of a lightmap."""
     settings = BakeSettings(**settings)
     with kernel_of(scene, threads) as kernel:
         emitters = emitters_of(scene, kernel.centre)
@@ -50,7 +50,7 @@ def full_light(scene, receivers, threads=2, **settings):
             kernel=kernel,
             solved=solved,
             receivers=receivers,
-            grid=None,
+            grid=grid,
             seen=SeenPoints(receivers, lambda values: values),
             error=settings.error,
             seed=settings.seed,
