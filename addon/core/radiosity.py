@@ -30,6 +30,7 @@ DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic: where errors larger th
 PATCH_OF = 4  # each of which sees the light of its like where it can, and patches only near by
 COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
 ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
+LIGHTMAP_ERROR = 0.05  # at the least, that patches are solved to for a lightmap
 QUICK_ERROR = 0.2  # of the solutions that say where it does
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
@@ -70,7 +71,9 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
 
     def solve(lit, error, on_step):
         emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
-        precision = replace(settings, error=error)
+        # a lightmap's rays see its texels' own light: patches only behind it and far off, a great many at a time
+        least = LIGHTMAP_ERROR if settings.target == "lightmap" else 0.0
+        precision = replace(settings, error=max(error, least))
         found = solve_patches(kernel, lit.patches, emitted, solver, method, precision, on_step)
         # no surface sends less than it emits: what overshooting or an iteration left below that is its error
         return replace(found, radiosity=np.maximum(found.radiosity, emitted))

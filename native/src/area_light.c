@@ -8,8 +8,8 @@ float spread_share(const area_light *light, float cosine) {
     const float half = 0.5f * light->spread;
     if (half >= 0.5f * PL_PI - 1e-3f)
         return 1;
-    const float tangent = sqrtf(fmaxf(0, 1 - cosine * cosine)) / fmaxf(cosine, 1e-6f);
-    return fmaxf(0, tanf(half) - tangent) / fmaxf(tanf(half) - half, 1e-9f);
+    const float tangent = sqrtf(greater(1 - cosine * cosine, 0)) / greater(cosine, 1e-6f);
+    return greater(tanf(half) - tangent, 0) / greater(tanf(half) - half, 1e-9f);
 }
 
 static void area_corners(const area_light *light, vec3 out_corners[4]) {
@@ -64,13 +64,12 @@ bool sample_area(const float *p, vec3 point, vec3 normal, float x, float y, pl_l
     const vec3 target = vec3_mul_add(light.axis_u, a, vec3_mul_add(light.axis_v, b, light.centre));
     out->direction = vec3_sub(vec3_mul_add(lamp_normal, rounding_of(target), target), point);
     out->far = far_of_face;
-    const float square = vec3_dot(out->direction, out->direction);
-    const float reach = sqrtf(square);
-    const float lamp_cosine = -vec3_dot(out->direction, lamp_normal) / fmaxf(reach, 1e-30f);
-    const float cosine = vec3_dot(out->direction, normal) / fmaxf(reach, 1e-30f);
+    const float inverse = 1 / greater(vec3_length(out->direction), 1e-30f);
+    const float lamp_cosine = -vec3_dot(out->direction, lamp_normal) * inverse;
+    const float cosine = vec3_dot(out->direction, normal) * inverse;
     if (cosine <= 0 || lamp_cosine <= 0)
         return false;
-    scaled(p + 3, cosine * lamp_cosine * area_of_lamp(&light) * spread_share(&light, lamp_cosine) / square,
+    scaled(p + 3, cosine * inverse * (lamp_cosine * inverse) * area_of_lamp(&light) * spread_share(&light, lamp_cosine),
            out->irradiance);
     return true;
 }

@@ -13,6 +13,7 @@
 #include <stdlib.h>
 
 enum { REPLICATES = 2 };
+enum { RETRIES = 32 }; /* of a sample that falls below the horizon, where one has to be found */
 
 typedef struct direct_job {
     const pl_scene *scene;
@@ -40,14 +41,15 @@ static size_t choose_light(const float *importances, size_t count, float total, 
 
 /*
  * The k-th sample of a light. Where the light has a closed form, samples only say which share of it is seen, so one
- * that falls below the horizon, or on a triangle's dark side, is drawn again: else a light of which no sample could
- * shine would be lost.
+ * that falls below the horizon, or on a triangle's dark side, is drawn again, while there are retries left: else a
+ * light of which no sample could shine would be lost.
  */
-static bool sample_above_horizon(const pl_lights *lights, vec3 point, vec3 normal, size_t light, bool is_exact,
-                                 uint32_t seed, uint32_t k, pl_light_sample *out_sample) {
-    const uint32_t tries = is_exact ? 32 : 1;
-    for (uint32_t try = 0; try < tries; ++try) {
+static bool sample_above_horizon(const pl_lights *lights, vec3 point, vec3 normal, size_t light, uint32_t seed,
+                                 uint32_t k, uint32_t *io_retries, pl_light_sample *out_sample) {
+    const uint32_t retries = *io_retries < RETRIES ? *io_retries : RETRIES;
+    for (uint32_t try = 0; try <= retries; ++try) {
         const uint32_t try_seed = try ? hash_pair(seed, 0x40000000u + try) : seed;
+        *io_retries -= try > 0;
         if (light_sample(lights, light, point, normal, sobol(k, 0, try_seed), sobol(k, 1, try_seed), out_sample))
             return true;
     }
@@ -64,8 +66,9 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
     const size_t chosen = choose_light(importances, lights->count, total, sobol(0, 2, seed));
     float exact[3];
     const bool is_exact = light_exact(lights, chosen, origin, normal, exact);
+    uint32_t retries = is_exact ? RETRIES : 0;
     if ((is_exact && luminance(exact) <= 0) ||
-        !sample_above_horizon(lights, origin, normal, chosen, is_exact, seed, 0, &sample))
+        !sample_above_horizon(lights, origin, normal, chosen, seed, 0, &retries, &sample))
         return false;
     /* the sample's own estimate has no bound close to a lamp: where there is a closed form the ray only says whether
        the lamp is seen */
@@ -105,14 +108,16 @@ static bool shine(direct_job *job, const pl_receiver_frame *frame, pl_light_samp
 typedef struct light_sums {
     float all[3], seen[3]; /* unoccluded, and what arrives */
     uint32_t visible, taken;
+    uint32_t retries; /* left */
 } light_sums;
 
-static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, bool is_exact, uint32_t seed,
-                         uint32_t first, uint32_t end, light_sums *io_sums) {
+static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed, uint32_t first,
+                         uint32_t end, light_sums *io_sums) {
     for (uint32_t k = first; k < end; ++k) {
         pl_light_sample sample;
         ++io_sums->taken;
-        if (!sample_above_horizon(job->lights, frame->origin, frame->shading, light, is_exact, seed, k, &sample))
+        if (!sample_above_horizon(job->lights, frame->origin, frame->shading, light, seed, k, &io_sums->retries,
+                                  &sample))
             continue;
         for (int c = 0; c < 3; ++c)
             io_sums->all[c] += sample.irradiance[c];
@@ -154,17 +159,19 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
         return;
     const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
     const uint32_t few = most < 8 ? most : most * 3 / 8 < 8 ? 8 : most * 3 / 8;
-    light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}, {{0}, {0}, 0, 0}};
+    /* a lamp that hardly rises above the horizon gives next to nothing: its samples are not worth RETRIES each */
+    const uint32_t retries = is_exact ? RETRIES + most : 0;
+    light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0, retries}, {{0}, {0}, 0, 0, retries}};
     uint32_t visible = 0, taken = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {
-        sample_range(job, frame, light, is_exact, hash_pair(seed, r), 0, few, &sums[r]);
+        sample_range(job, frame, light, hash_pair(seed, r), 0, few, &sums[r]);
         visible += sums[r].visible;
         taken += sums[r].taken;
     }
     for (uint32_t r = 0; r < REPLICATES; ++r) {
         float rgb[3];
         if (visible > 0 && visible < taken)
-            sample_range(job, frame, light, is_exact, hash_pair(seed, r), few, most, &sums[r]);
+            sample_range(job, frame, light, hash_pair(seed, r), few, most, &sums[r]);
         estimate(&sums[r], is_exact ? exact : NULL, rgb);
         for (int c = 0; c < 3; ++c)
             io_totals[r][c] += rgb[c];
@@ -224,7 +231,7 @@ static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint
         out_rgb[c] = bounded(0.5f * (totals[0][c] + totals[1][c]));
     /* of a mean of two */
     const float difference = luminance(totals[0]) - luminance(totals[1]);
-    *out_variance = fminf(0.25f * difference * difference, most_light * most_light);
+    *out_variance = lesser(0.25f * difference * difference, most_light * most_light);
 }
 
 pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers, size_t first,

@@ -143,7 +143,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         for (int k = 0; k < 3; ++k)
             weight[k] *= solution->reflectance[3 * (side / 2) + (size_t)k];
         /* Russian roulette: what carries little ends early, and what is left stands for it */
-        const float survival = fminf(1, fmaxf(weight[0], fmaxf(weight[1], weight[2])));
+        const float survival = lesser(greater(weight[0], greater(weight[1], weight[2])), 1);
         if (draw(&random) >= survival)
             return;
         for (int k = 0; k < 3; ++k)

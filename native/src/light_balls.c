@@ -18,7 +18,7 @@ static void describe_ball(const pl_lights *lights, size_t light, pl_light_balls 
         const area_light lamp = area_of(p);
         io_balls->radius[light] = vec3_length(vec3_add(lamp.axis_u, lamp.axis_v));
         /* a narrow beam is concentrated on its axis */
-        io_balls->strength[light] = luminance(p + 3) * area_of_lamp(&lamp) * fmaxf(spread_share(&lamp, 1), 1);
+        io_balls->strength[light] = luminance(p + 3) * area_of_lamp(&lamp) * greater(spread_share(&lamp, 1), 1);
         break;
     }
     case PL_LIGHT_MESH:
@@ -28,7 +28,7 @@ static void describe_ball(const pl_lights *lights, size_t light, pl_light_balls 
     default:
         io_balls->strength[light] = 0;
     }
-    io_balls->strength[light] = fminf(io_balls->strength[light], 1e30f);
+    io_balls->strength[light] = lesser(io_balls->strength[light], 1e30f);
     const bool is_plain = lights->kinds[light] == PL_LIGHT_POINT && p[12] < -1;
     if (!is_plain)
         io_balls->special[io_balls->special_count++] = light;

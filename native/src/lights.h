@@ -20,7 +20,7 @@ static inline float luminance(const float rgb[3]) { return 0.2126f * rgb[0] + 0.
  * must still be a float. What is no number is no light.
  */
 static const float most_light = 1e17f;
-static inline float bounded(float light) { return light > 0 ? fminf(light, most_light) : 0; }
+static inline float bounded(float light) { return light > 0 ? lesser(light, most_light) : 0; }
 
 /* Whether kinds are known and glowing triangles in range. */
 bool lights_are_valid(const pl_lights *lights);

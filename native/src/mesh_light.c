@@ -36,18 +36,16 @@ float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 
 
 /* The triangle whose share of the cumulative sums x falls into; x becomes its place in that share. */
 static size_t choose_triangle(const pl_lights *lights, const mesh_light *light, float *io_x, float *out_chance) {
-    size_t low = light->first, high = light->first + light->count;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (lights->cumulative[middle] <= *io_x)
-            low = middle;
-        else
-            high = middle;
+    size_t low = light->first;
+    for (size_t left = light->count, half; left > 1; left -= half) {
+        half = left / 2;
+        /* no branch: it would be taken by chance, and guessed wrongly half of the time */
+        low += half * (size_t)(lights->cumulative[low + half] <= *io_x);
     }
     const float start = lights->cumulative[low];
     const float end = low + 1 < light->first + light->count ? lights->cumulative[low + 1] : 1;
-    *out_chance = fmaxf(end - start, 1e-12f);
-    *io_x = fminf(fmaxf((*io_x - start) / *out_chance, 0), 1);
+    *out_chance = greater(end - start, 1e-12f);
+    *io_x = lesser(greater((*io_x - start) / *out_chance, 0), 1);
     return low;
 }
 
@@ -65,21 +63,21 @@ bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec3 norma
 
     /* the target is moved off the face towards the receiver, so that the face itself,
        which is an occluder too, is not in the way */
-    vec3 lamp_normal = vec3_unit(twice_area);
+    const float twice = vec3_length(twice_area);
+    vec3 lamp_normal = vec3_scale(twice_area, 1 / greater(twice, 1e-30f));
     if (vec3_dot(vec3_sub(point, target), lamp_normal) < 0)
         lamp_normal = vec3_scale(lamp_normal, -1);
-    target = vec3_mul_add(lamp_normal, fmaxf(rounding_of(target), 9.5367431640625e-7f * light.radius), target);
+    target = vec3_mul_add(lamp_normal, greater(rounding_of(target), 9.5367431640625e-7f * light.radius), target);
 
     out->direction = vec3_sub(target, point);
     out->far = far_of_face;
-    const float square = vec3_dot(out->direction, out->direction);
-    const float reach = fmaxf(sqrtf(square), 1e-30f);
-    const float lamp_cosine = -vec3_dot(out->direction, lamp_normal) / reach;
-    const float cosine = vec3_dot(out->direction, normal) / reach;
-    if (cosine <= 0 || lamp_cosine <= 0)
+    const float lamp_height = -vec3_dot(out->direction, lamp_normal), height = vec3_dot(out->direction, normal);
+    if (height <= 0 || lamp_height <= 0)
         return false;
-    const float area = 0.5f * vec3_length(twice_area);
     const float *radiance = radiance_towards(lights, t, a, twice_area, point);
-    scaled(radiance, cosine * lamp_cosine * area / (square * chance), out->irradiance);
+    /* cosines are heights by the distance, of which each takes one off the square law */
+    const float inverse_square = 1 / vec3_dot(out->direction, out->direction);
+    scaled(radiance, height * inverse_square * (lamp_height * inverse_square) * (0.5f * twice / chance),
+           out->irradiance);
     return luminance(radiance) > 0;
 }

@@ -101,9 +101,9 @@ bool pl_patches_fit(const pl_patches *patches, const pl_scene *scene) {
 static const float least_weight = 0x1p-18f;
 
 static pl_barycentric off_the_edges(float weight_1, float weight_2) {
-    weight_1 = fmaxf(weight_1, least_weight);
-    weight_2 = fmaxf(weight_2, least_weight);
-    const float scale = fminf(1, (1 - least_weight) / (weight_1 + weight_2));
+    weight_1 = greater(weight_1, least_weight);
+    weight_2 = greater(weight_2, least_weight);
+    const float scale = lesser((1 - least_weight) / (weight_1 + weight_2), 1);
     return (pl_barycentric){weight_1 * scale, weight_2 * scale};
 }
 
@@ -120,7 +120,7 @@ pl_barycentric point_in_patch(const pl_patches *patches, size_t patch, float x, 
 
     /* the width of the triangle falls linearly towards the apex: area goes with the width's square */
     const float wide = 1 - i / rows;
-    const float narrow = fmaxf(0, 1 - (i + 1) / rows);
+    const float narrow = greater(1 - (i + 1) / rows, 0);
     const float width = sqrtf(wide * wide + x * (narrow * narrow - wide * wide));
     const float across = (j + y) / columns;
 

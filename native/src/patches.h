@@ -37,7 +37,7 @@ static inline int32_t patch_at(const pl_patches *patches, int32_t triangle, floa
     const int32_t rows = patches->first_rows[triangle + 1] - first_row;
     const float weights[3] = {1 - u - v, u, v};
     const int apex = patches->apexes[triangle];
-    const float down = fminf(fmaxf(weights[apex], 0), 1);
+    const float down = lesser(greater(weights[apex], 0), 1);
     const int32_t row = part_at(down, rows);
     const int32_t first_cell = patches->first_cells[first_row + row];
     const int32_t columns = patches->first_cells[first_row + row + 1] - first_cell;
@@ -45,7 +45,7 @@ static inline int32_t patch_at(const pl_patches *patches, int32_t triangle, floa
     if (columns == 1 && patches->first_patches[first_cell + 1] == first + 1)
         return first;
     const float weight_after = weights[apex == 0 ? 2 : apex == 1 ? 0 : 1];
-    const float across = fminf(fmaxf(weight_after / fmaxf(1 - down, 1e-30f), 0), 1);
+    const float across = lesser(greater(weight_after / greater(1 - down, 1e-30f), 0), 1);
     const int32_t column = part_at(across, columns);
     const int32_t along = patches_along(patches, first_cell + column);
     if (along == 1)

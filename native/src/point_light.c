@@ -6,8 +6,8 @@ static float cone_share(const point_light *light, vec3 from_light) {
     if (light->cos_inner < -1)
         return 1;
     const float cosine = vec3_dot(from_light, light->direction);
-    const float range = fmaxf(light->cos_inner - light->cos_outer, 1e-6f);
-    const float t = fminf(fmaxf((cosine - light->cos_outer) / range, 0), 1);
+    const float range = greater(light->cos_inner - light->cos_outer, 1e-6f);
+    const float t = lesser(greater((cosine - light->cos_outer) / range, 0), 1);
     return t * t * (3 - 2 * t);
 }
 
@@ -19,7 +19,7 @@ float cone_importance(const point_light *light, vec3 point) {
         return 1;
     const float share = cone_share(light, vec3_scale(to, -1 / distance));
     /* a sphere's edge can look into a cone that its centre is out of */
-    return fmaxf(share, light->radius > 0 ? 0.01f : 0);
+    return greater(share, light->radius > 0 ? 0.01f : 0);
 }
 
 /* A uniform direction in the cone that a sphere fills; its solid angle over the area of a disc of its radius. */
@@ -36,10 +36,10 @@ static bool sample_sphere(const point_light *light, vec3 to, float distance, flo
     const float one_minus_cos_max = sine * sine / (1 + sqrtf(1 - sine * sine));
     const float one_minus_cos = x * one_minus_cos_max;
     const float cosine = 1 - one_minus_cos;
-    const float side = sqrtf(fmaxf(0, one_minus_cos * (2 - one_minus_cos)));
+    const float side = sqrtf(greater(one_minus_cos * (2 - one_minus_cos), 0));
     const vec3 across = vec3_mul_add(u, side * cosf(angle), vec3_scale(v, side * sinf(angle)));
     *out_direction = vec3_mul_add(axis, cosine, across);
-    *out_far = distance * cosine - sqrtf(fmaxf(0, light->radius * light->radius - distance * distance * side * side));
+    *out_far = distance * cosine - sqrtf(greater(light->radius * light->radius - distance * distance * side * side, 0));
     *out_over_disc = 2 / (distance * distance * (1 + sqrtf(1 - sine * sine)));
     return true;
 }
@@ -83,7 +83,7 @@ bool sample_point_light(const float *p, vec3 point, vec3 normal, float x, float 
 }
 
 float sun_importance(const float *p, vec3 normal) {
-    return luminance(p + 3) * fmaxf(0, vec3_dot(vec3_from(p), normal) + sinf(fminf(p[6], 1.5f)));
+    return luminance(p + 3) * greater(vec3_dot(vec3_from(p), normal) + sinf(lesser(p[6], 1.5f)), 0);
 }
 
 bool sample_sun(const float *p, vec3 normal, float x, float y, pl_light_sample *out) {

@@ -55,7 +55,7 @@ static inline float sobol(uint32_t index, int dimension, uint32_t seed) {
 static inline vec3 cosine_direction(float x, float y, vec3 u, vec3 v, vec3 n) {
     const float radius = sqrtf(x), angle = 2 * PL_PI * y;
     const vec3 across = vec3_mul_add(u, radius * cosf(angle), vec3_scale(v, radius * sinf(angle)));
-    return vec3_mul_add(n, sqrtf(fmaxf(0, 1 - x)), across);
+    return vec3_mul_add(n, sqrtf(greater(1 - x, 0)), across);
 }
 
 #endif

@@ -188,7 +188,7 @@ pl_hit opaque_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near
 
 /* Of a hit on an edge, to within the rounding of a hit from a hundred times the triangle's size. */
 static bool is_at_edge(const pl_hit *hit) {
-    return fminf(fminf(hit->u, hit->v), 1 - hit->u - hit->v) < 1.52587890625e-5f;
+    return lesser(lesser(hit->u, hit->v), 1 - hit->u - hit->v) < 1.52587890625e-5f;
 }
 
 pl_hit closest_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near) {

@@ -57,7 +57,7 @@ static inline vec3 point_off_triangle(const pl_scene *scene, int32_t triangle, v
     float largest = 0;
     for (int corner = 0; corner < 3; ++corner) {
         const vec3 p = scene_vertex(scene, triangle, corner);
-        largest = fmaxf(largest, fmaxf(fabsf(p.x), fmaxf(fabsf(p.y), fabsf(p.z))));
+        largest = greater(largest, greater(fabsf(p.x), greater(fabsf(p.y), fabsf(p.z))));
     }
     return vec3_mul_add(normal, 9.5367431640625e-7f * largest, point);
 }

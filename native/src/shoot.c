@@ -18,7 +18,7 @@ static void tint_flux(const pl_scene *scene, vec3 origin, vec3 direction, float 
     float through[3] = {1, 1, 1};
     transmit(scene, origin, direction, far, through);
     for (int k = 0; k < 3; ++k)
-        io_rgb[k] = (uint64_t)((double)io_rgb[k] * (double)fminf(through[k], 1));
+        io_rgb[k] = (uint64_t)((double)io_rgb[k] * (double)lesser(through[k], 1));
 }
 
 /* The index of the side that owns ray `ray`: of the last whose first ray is not after it. */

@@ -26,9 +26,6 @@ static float falling(float x) {
     return fourth * fourth;
 }
 
-/* fminf minds NaNs, and is a call. */
-static float least(float a, float b) { return a < b ? a : b; }
-
 /* The texel that is smoothed, as its neighbours are held against it. */
 typedef struct middle {
     const double *position;
@@ -60,7 +57,7 @@ static const float tolerance = 7;
 static float value_weight(const smooth_job *job, const middle *at, size_t other) {
     const float difference = at->luminance - luminance(job->values + CHANNELS * other);
     const float va = at->variance, vb = job->variances[other];
-    const float noise = least(va, noisier * vb) + least(vb, noisier * va);
+    const float noise = lesser(va, noisier * vb) + lesser(vb, noisier * va);
     return noise > 0 ? falling(difference * difference / (tolerance * noise)) : (difference == 0 ? 1.0f : 0.0f);
 }
 

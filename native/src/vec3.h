@@ -6,6 +6,10 @@
 
 static const float PL_PI = 3.14159265358979f;
 
+/* fminf and fmaxf mind NaNs, and are calls. Of a value that is none, these take the bound. */
+static inline float lesser(float value, float bound) { return value < bound ? value : bound; }
+static inline float greater(float value, float bound) { return value > bound ? value : bound; }
+
 typedef struct vec3 {
     float x, y, z;
 } vec3;
