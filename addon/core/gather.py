@@ -37,7 +37,8 @@ MOST_IDLE = 2  # the noise
 AIM = 0.95  # of the target: what receivers are due is an estimate
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
 SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
-MOST_EXTRA = 1  # pass after that, with four times the rays: few speckles are left by then
+MOST_EXTRA = 1  # pass after that, with four times the rays and no more than
+SPECKLE_SHARE = 1 / 8  # of those traced: most speckles are gone by then
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 PROBE_DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
@@ -306,14 +307,15 @@ def _gather_until(job: _Job, grid, direct, error, seed, seconds_left, on_step) -
         extra += rms <= error
         speckled = np.where(relative > SPECKLE * error, np.inf, 0.0)
         due = rays_due(errors, taken, AIM * error) if rms > error else speckled
+        left = budget - rays if rms > error else min(budget - rays, SPECKLE_SHARE * rays)
         in_time = seconds_left() * rays / (time.perf_counter() - started)
         cost = rays / int(taken.sum())  # of one more ray of all replicates, with those that it goes on as
         wanting, _ = next_pass(due, taken, MOST_RAYS, cost, np.inf)
         if extra > MOST_EXTRA or not len(wanting):
             return ended()
-        active, further = next_pass(due, taken, MOST_RAYS, cost, min(budget - rays, in_time))
+        active, further = next_pass(due, taken, MOST_RAYS, cost, min(left, in_time))
         if len(active) < ENOUGH * len(wanting):
-            return ended("by the time limit" if in_time < budget - rays else "by the budget of rays")
+            return ended("by the time limit" if in_time < left else "by the budget of rays")
 
 
 def _gather_pass(job: _Job, active, taken, further, seed, sums, on_step) -> int:
