@@ -107,8 +107,8 @@ static bool shine(direct_job *job, const pl_receiver_frame *frame, pl_light_samp
 
 typedef struct light_sums {
     float all[3], seen[3]; /* unoccluded, and what arrives */
-    uint32_t visible, taken;
-    uint32_t retries; /* left */
+    uint32_t taken, above, visible; /* samples: all, those above the horizon, those not hidden */
+    uint32_t retries;               /* left */
 } light_sums;
 
 static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed, uint32_t first,
@@ -119,6 +119,7 @@ static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t
         if (!sample_above_horizon(job->lights, frame->origin, frame->shading, light, seed, k, &io_sums->retries,
                                   &sample))
             continue;
+        ++io_sums->above;
         for (int c = 0; c < 3; ++c)
             io_sums->all[c] += sample.irradiance[c];
         if (!shine(job, frame, &sample))
@@ -161,16 +162,16 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
     const uint32_t few = most < 8 ? most : most * 3 / 8 < 8 ? 8 : most * 3 / 8;
     /* a lamp that hardly rises above the horizon gives next to nothing: its samples are not worth RETRIES each */
     const uint32_t retries = is_exact ? RETRIES + most : 0;
-    light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0, retries}, {{0}, {0}, 0, 0, retries}};
-    uint32_t visible = 0, taken = 0;
+    light_sums sums[REPLICATES] = {{.retries = retries}, {.retries = retries}};
+    uint32_t visible = 0, all = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {
         sample_range(job, frame, light, hash_pair(seed, r), 0, few, &sums[r]);
         visible += sums[r].visible;
-        taken += sums[r].taken;
+        all += is_exact ? sums[r].above : sums[r].taken;
     }
     for (uint32_t r = 0; r < REPLICATES; ++r) {
         float rgb[3];
-        if (visible > 0 && visible < taken)
+        if (visible > 0 && visible < all)
             sample_range(job, frame, light, hash_pair(seed, r), few, most, &sums[r]);
         estimate(&sums[r], is_exact ? exact : NULL, rgb);
         for (int c = 0; c < 3; ++c)
