@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .allocation import rays_due
+from .workers import within
 
 FIRST = 1 / 4  # of the shadow rays of a penumbra, for the first look at direct light, ...
 LEAST_FIRST = 16  # ... but no fewer: with its neighbours' a receiver then has hundreds, and they know what is hidden
@@ -77,7 +78,7 @@ def refined_direct(
                 chosen,
                 int(count),
                 seed + 1000 * attempt,
-                lambda done: on_step(begin + share * done),  # noqa: B023
+                within(on_step, begin, share),
             )
             samples[chosen] = count
             rays, begin = rays + traced, begin + share

@@ -15,6 +15,7 @@ import numpy as np
 from .charts import Charts
 from .emitters import LUMINANCE
 from .receivers import CornerMeans, Receivers, surface_receivers
+from .relative import scale_of
 from .scene import Scene
 from .texels import TexelMap
 
@@ -56,6 +57,27 @@ class Measured:
         # one wrong point counts as one, however wrong
         squares = np.minimum(((values @ LUMINANCE - self.luminance) / scale) ** 2, 1.0)
         return squares - np.minimum(self.variance / scale**2, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Probes:
+    """Some of the receivers, measured.
+
+    Attributes
+    ----------
+    receivers : uint32 (K,) which
+    weights : (K,) of their squared errors
+    measured : what light they have
+    """
+
+    receivers: np.ndarray
+    weights: np.ndarray
+    measured: Measured
+
+    def squares_of(self, values):
+        """Squared relative errors (K,) of all receivers' irradiance (N, 3), weighted."""
+        scale = scale_of(values)[self.receivers]
+        return self.weights * self.measured.squares_of(values[self.receivers], scale)
 
 
 def rms_of(squares) -> float:

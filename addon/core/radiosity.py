@@ -23,6 +23,7 @@ from .settings import BakeSettings
 from .solver import Solution
 from .stochastic import solve_stochastic
 from .transport import form_factors
+from .workers import within
 
 # patches, about, that each solver is given; triangles are never joined, so there may be more
 PATCH_BUDGETS = {"direct": 1200, "conjugate-gradient": 5000, "progressive": 3000, "stochastic": 60000}
@@ -86,10 +87,10 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
         else:
             grid = grid_of(scene, patch_size_for(scene, budget), budget)
             patches = finer_where_parted(scene, kernel, grid, budget, settings.seed)
-        lit = measure(patches, lambda done: on_step(0.4 * done))
+        lit = measure(patches, within(on_step, 0.0, 0.4))
     else:
-        lit = _decompose(scene, kernel, budget, settings, measure, solve, lambda done: on_step(0.4 * done))
-    solution = solve(lit, settings.error, lambda done: on_step(0.5 + 0.5 * done))
+        lit = _decompose(scene, kernel, budget, settings, measure, solve, within(on_step, 0.0, 0.4))
+    solution = solve(lit, settings.error, within(on_step, 0.5, 0.5))
 
     patches = lit.patches
     reaches, is_confined = reaches_of(scene, kernel, patches, settings.seed)
@@ -123,12 +124,12 @@ def _decompose(scene, kernel, budget, settings, measure, solve, on_step) -> Patc
     grid = grid_of(scene, patch_size_for(scene, coarse), coarse)
     along = np.ones(len(grid), np.int64)
     rounds = 1 + 2 * len(ROUND_SHARES)  # to measure, and to solve and measure again each time
-    lit = measure(cut(scene, kernel, grid, along, settings.seed), lambda done: on_step(done / rounds))
+    lit = measure(cut(scene, kernel, grid, along, settings.seed), within(on_step, 0.0, 1 / rounds))
     count = len(lit.patches)
     for turn, share in enumerate(ROUND_SHARES):
         begin = 1 + 2 * turn
         quick = max(settings.error, QUICK_ERROR)
-        first = solve(lit, quick, lambda done: on_step((begin + done) / rounds))  # noqa: B023
+        first = solve(lit, quick, within(on_step, begin / rounds, 1 / rounds))
         reflectance = np.maximum(lit.patches.side_reflectance, LEAST_REFLECTANCE)
         irradiance = (first.radiosity / reflectance) @ LUMINANCE
         finer_along = finer(grid, along, lit.patches, irradiance, lit.spread, count + int(share * budget))
@@ -137,7 +138,7 @@ def _decompose(scene, kernel, budget, settings, measure, solve, on_step) -> Patc
             break
         along = finer_along
         patches = cut(scene, kernel, grid, along, settings.seed)
-        lit = measure(patches, lambda done: on_step((begin + 1 + done) / rounds), lit)  # noqa: B023
+        lit = measure(patches, within(on_step, (begin + 1) / rounds, 1 / rounds), lit)
     return lit
 
 

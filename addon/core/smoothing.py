@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .charts import Charts
-from .emitters import LUMINANCE
 from .kernel import smooth
 from .receivers import Receivers
 from .relative import scale_of
@@ -75,13 +74,11 @@ def pooled(workers: Workers, grid: TexelGrid | None, receivers: Receivers, of_on
     return smooth(workers, grid, receivers, np.repeat(of_one_ray[:, None], 3, axis=1), of_one_ray, 1, False)[0][:, 0]
 
 
-def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, means, near, taken):
-    """Replicate means (N, R, 3) of gathered light, smoothed: values float32 (N, 3), variance of luminance (N,).
+def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, variances, near, taken):
+    """Gathered light (N, 3) smoothed by its variances (N,): values float32 (N, 3), variance of luminance (N,).
 
-    ``near`` (N, 3) is the means ``blurred``, ``taken`` (N,) how many rays each is of.
+    ``near`` (N, 3) is the light ``blurred``, ``taken`` (N,) how many rays each is of.
     """
-    values = means.mean(axis=1, dtype=np.float32)
-    variances = (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]
     variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
     # pooled relative to the light there, as the noise of what is bright says nothing of the calm beside it
     scales = scale_of(near)

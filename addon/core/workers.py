@@ -15,6 +15,11 @@ from .settings import BakeCancelled
 OnProgress = Callable[[str, float], bool]
 
 
+def within(on_step: Callable[[float], None], begin: float, width: float) -> Callable[[float], None]:
+    """Tells how far a part is (0..1) as how far the whole is, of which the part is the stretch from ``begin`` on."""
+    return lambda done: on_step(begin + width * done)
+
+
 class Progress:
     """Where a bake is: stages that each take a share of the whole, told to a callback, and timed."""
 

@@ -21,7 +21,8 @@ from patchlight.blender import bake_scene, demo
 from patchlight.blender.files import open_blend
 from patchlight.core import kernel as kernel_module
 from patchlight.core.emitters import emitters_of
-from patchlight.core.gather import NEAR, REPLICATES
+from patchlight.core.gather import NEAR
+from patchlight.core.gather_job import REPLICATES
 from patchlight.core.guides import learn_guides
 from patchlight.core.radiosity import solve_radiosity
 from patchlight.core.receivers import surface_receivers

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from addon.core.gather_job import variance_of
 from addon.core.kernel import smooth
 from addon.core.receivers import Receivers
 from addon.core.smoothing import TexelGrid, blurred, smoothed
@@ -35,7 +36,8 @@ def noisy(light, deviation, seed=1):
 def run(grid, receivers, means, taken=1):
     with Workers(2) as workers:
         near = blurred(workers, grid, receivers, means)
-        return smoothed(workers, grid, receivers, means, near, np.broadcast_to(taken, len(means)))
+        taken = np.broadcast_to(taken, len(means))
+        return smoothed(workers, grid, receivers, means.mean(axis=1), variance_of(means), near, taken)
 
 
 @pytest.mark.parametrize("step", [1, 4])

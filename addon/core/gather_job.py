@@ -1,0 +1,86 @@
+"""What every step of a gather shares: the scene's light as far as it is known, and rays into it from receivers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .emitters import LUMINANCE
+from .guides import Guides, no_guides
+from .kernel import KernelScene
+from .radiosity import Solved
+from .receivers import Receivers
+from .smoothing import TexelGrid
+from .texel_light import NO_TEXEL_LIGHT, TexelLight
+
+REPLICATES = 4  # independent randomisations; their spread is the error estimate
+
+
+@dataclass(frozen=True, slots=True)
+class GatherJob:
+    """Receivers, and the light that their rays see.
+
+    Attributes
+    ----------
+    solved : the patches' reflected light, and what direct light is sampled from
+    receivers : (N,)
+    weights : float32 (N,) of their squared errors in the mean of all, of a mean of 1
+    guides : where their rays go
+    texel_light : what rays see where a lightmap's texels are known
+    """
+
+    kernel: KernelScene
+    solved: Solved
+    receivers: Receivers
+    weights: np.ndarray
+    guides: Guides
+    texel_light: TexelLight = NO_TEXEL_LIGHT
+
+    def part(self, chosen) -> GatherJob:
+        """The same for some of the receivers."""
+        return replace(
+            self,
+            receivers=self.receivers.part(chosen),
+            weights=self.weights[chosen],
+            guides=self.guides.part(chosen),
+        )
+
+    def at(self, receivers: Receivers) -> GatherJob:
+        """The same light at other receivers."""
+        weights = np.ones(len(receivers), np.float32)
+        return replace(self, receivers=receivers, weights=weights, guides=no_guides(len(receivers)))
+
+    def looking_further(self, factor) -> GatherJob:
+        """The same with less taken for granted of what rays hit."""
+        solved = replace(self.solved, patches=self.solved.patches.looking_further(factor))
+        return replace(self, solved=solved, texel_light=self.texel_light.looking_further(factor))
+
+    def seeing(self, grid: TexelGrid, direct, gathered) -> GatherJob:
+        """The same whose rays see direct and gathered light (N, 3) on the texels."""
+        radiosity = (grid.reflectance * (direct + gathered)).astype(np.float32)
+        return replace(self, texel_light=replace(self.texel_light, radiosity=radiosity))
+
+    def direct(self, samples, seed, on_step=None):
+        """Direct light of ``samples`` shadow rays each, as KernelScene.direct gives it."""
+        return self.kernel.direct(self.solved.sources, self.receivers, samples, seed, on_step)
+
+    def gather(self, selected, first, take, seed, sums, on_step=None) -> int:
+        """Add rays ``first`` to ``first + take`` of every replicate to the selected receivers' ``sums`` (N, R, 3)."""
+        light = (self.solved.patches, self.texel_light, self.solved.sources)
+        selected = np.ascontiguousarray(selected, np.uint32)
+        return self.kernel.gather(
+            *light, self.receivers, self.guides, selected, REPLICATES, first, take, seed, sums, on_step
+        )
+
+    def gathered(self, count, seed, on_step=None):
+        """Means of ``count`` rays of each replicate (N, R, 3), the variance of their mean (N,), the rays traced."""
+        sums = np.zeros((len(self.receivers), REPLICATES, 3), np.float32)
+        rays = self.gather(np.arange(len(sums)), 0, count, seed, sums, on_step)
+        means = sums / count
+        return means, variance_of(means), rays
+
+
+def variance_of(means):
+    """Variance (N,) of the luminance of the mean of replicates' means (N, R, 3), by their spread."""
+    return (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]

@@ -1,0 +1,189 @@
+"""Gathering in passes, each for the receivers that still need it, until the error that is measured is the target."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .allocation import measured_errors, next_pass, rays_due
+from .denoising import denoised
+from .gather_job import REPLICATES, GatherJob, variance_of
+from .measuring import probes_among
+from .probes import Probes, rms_of
+from .relative import scale_of
+from .smoothing import TexelGrid, blurred, pooled, smoothed
+from .workers import within
+
+FIRST_RAYS = 2  # of a replicate, in the first pass, on MANY_TEXELS and more, whose neighbours vouch for them;
+FIRST_ALONE = 8  # elsewhere: fewer may miss what is bright and small, and not know it
+MANY_TEXELS = 1 << 16
+MOST_RAYS = 2048  # of a replicate
+MOST_COST = 15  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
+FREE_RAYS = 1 << 26
+USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
+WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
+MOST_IDLE = 2  # the noise
+AIM = 0.95  # of the target: what receivers are due is an estimate
+DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
+SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
+MOST_EXTRA = 1  # pass after that, with four times the rays and no more than
+SPECKLE_SHARE = 1 / 8  # of those traced: most speckles are gone by then
+ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
+
+
+@dataclass(frozen=True, slots=True)
+class Gathered:
+    """What passes have come to.
+
+    Attributes
+    ----------
+    job : whose rays see the light that was found last
+    values : float32 (N, 3) irradiance [W/m^2]
+    rms : its relative error, as measured
+    stopped : what ended the passes, "" where nothing was left to do
+    is_denoised : whether the denoiser's estimate was the better one
+    rays, probe_rays : traced by the passes, and to measure the error
+    """
+
+    job: GatherJob
+    values: np.ndarray
+    rms: float
+    stopped: str
+    is_denoised: bool
+    rays: int
+    probe_rays: int
+
+
+class _Samples:
+    """The rays of all passes: sums (N, R, 3), how many of a replicate each receiver has (N,), how many were traced."""
+
+    def __init__(self, count: int):
+        self.sums, self.taken, self.rays = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64), 0
+
+    def add(self, job: GatherJob, active, further, seed, on_step) -> None:
+        """Trace ``further`` (N,) rays of every replicate at the ``active`` receivers (K,), those of a kind at once."""
+        done = 0.0
+        for first, count in np.unique(np.stack([self.taken[active], further[active]], axis=1), axis=0):
+            group = active[(self.taken[active] == first) & (further[active] == count)]
+            share = len(group) / len(active)
+            self.rays += job.gather(group, int(first), int(count), seed, self.sums, within(on_step, done, share))
+            done += share
+        self.taken[active] += further[active]
+
+    @property
+    def means(self):
+        """Of the replicates, (N, R, 3)."""
+        return self.sums / self.taken[:, None, None].astype(np.float32)
+
+    @property
+    def cost(self) -> float:
+        """Rays traced for one of all replicates: with those that it goes on as."""
+        return self.rays / int(self.taken.sum())
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """An estimate: irradiance (N, 3), its stated relative noise (N,), and its squared errors at the probes."""
+
+    values: np.ndarray
+    noise: np.ndarray
+    squares: np.ndarray
+    is_denoised: bool = False
+
+    @property
+    def rms(self) -> float:
+        return rms_of(self.squares)
+
+
+def gather_until(
+    job: GatherJob, grid: TexelGrid | None, direct, denoise: Callable | None, error, seed, seconds_left, on_step
+) -> Gathered:
+    """Gather until the error is the target, or further rays no longer help or cannot be afforded.
+
+    Parameters
+    ----------
+    grid, denoise, error, seconds_left : as in gather.gather_irradiance
+    direct : float32 (N, 3) direct light at the job's receivers
+    """
+    count, started = len(job.receivers), time.perf_counter()
+    samples, probes = _Samples(count), None
+    active, further = np.arange(count), np.full(count, FIRST_RAYS if grid and count >= MANY_TEXELS else FIRST_ALONE)
+    budget, idle, extra, begin, rms = 0, 0, 0, 0.0, np.inf
+    while True:
+        # half of what is left of the bar for each pass: nobody knows how many there will be
+        width = 0.5 * (1 - begin)
+        samples.add(job, active, further, seed, within(on_step, begin, width))
+        begin += width
+        budget = budget or int(max(MOST_COST * samples.rays, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
+        means = samples.means
+        near = None
+        if grid:
+            # blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while
+            # smoothing that minds values would take some of a few rays' light away
+            near = blurred(job.kernel.workers, grid, job.receivers, means)
+            job = job.seeing(grid, direct, near)
+        probes = probes or probes_among(job, error, seed + 1)
+        found = _best_estimate(job, grid, means, near, samples.taken, direct, probes)
+        is_asked = error < found.rms <= DENOISE * error
+        if is_asked:
+            found = _denoised(denoise, grid, found, means, direct, probes)
+        idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
+        rms = found.rms
+        extra += rms <= error
+        in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
+        active, further, stopped = _next(found, samples, probes, error, budget - samples.rays, in_time)
+        if idle == MOST_IDLE:
+            stopped = "as further rays no longer help"
+        elif extra > MOST_EXTRA:
+            stopped = ""
+        if stopped is not None:
+            found = found if is_asked else _denoised(denoise, grid, found, means, direct, probes)
+            traced = samples.rays, probes.measured.rays
+            return Gathered(job, found.values, found.rms, stopped, found.is_denoised, *traced)
+
+
+def _best_estimate(job: GatherJob, grid, means, near, taken, direct, probes: Probes) -> _Found:
+    """What replicate means (N, R, 3) come to; ``near`` is the means blurred.
+
+    Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
+    """
+    workers, receivers = job.kernel.workers, job.receivers
+    values, variance = means.mean(axis=1), variance_of(means)
+    estimates = [(values, pooled(workers, None, receivers, variance * taken) / taken)]
+    if grid is not None:
+        estimates.append(smoothed(workers, grid, receivers, values, variance, near, taken))
+    found = []
+    for gathered, noise in estimates:
+        lit = (direct + gathered).astype(np.float32)
+        found.append(_Found(lit, np.sqrt(job.weights * noise) / scale_of(lit), probes.squares_of(lit)))
+    return min(found, key=lambda estimate: estimate.rms)
+
+
+def _denoised(denoise, grid, found: _Found, means, direct, probes: Probes) -> _Found:
+    """What the denoiser makes of it, where there is one and the probes find it better."""
+    if denoise is None or grid is None:
+        return found
+    gathered = means.mean(axis=1, dtype=np.float32)
+    values = denoised(denoise, grid, found.values, direct, gathered, probes.receivers, probes.measured)
+    other = replace(found, values=values, squares=probes.squares_of(values), is_denoised=True)
+    return min(found, other, key=lambda estimate: estimate.rms)
+
+
+def _next(found: _Found, samples: _Samples, probes: Probes, error, rays_left, rays_in_time):
+    """The receivers of the next pass (K,), further rays of each (N,), and what stops it, None where nothing does."""
+    if found.rms > error:
+        errors = measured_errors(found.noise, probes.receivers, found.squares)
+        due = rays_due(errors, samples.taken, AIM * error)
+    else:
+        due = np.where(found.noise > SPECKLE * error, np.inf, 0.0)
+        rays_left = min(rays_left, SPECKLE_SHARE * samples.rays)
+    wanting, _ = next_pass(due, samples.taken, MOST_RAYS, samples.cost, np.inf)
+    active, further = next_pass(due, samples.taken, MOST_RAYS, samples.cost, min(rays_left, rays_in_time))
+    if not len(wanting):
+        return active, further, ""
+    if len(active) < ENOUGH * len(wanting):
+        return active, further, "by the time limit" if rays_in_time < rays_left else "by the budget of rays"
+    return active, further, None
