@@ -106,7 +106,7 @@ static bool shine(direct_job *job, const pl_receiver_frame *frame, pl_light_samp
 }
 
 typedef struct light_sums {
-    float all[3], seen[3]; /* unoccluded, and what arrives */
+    float all[3], seen[3];          /* unoccluded, and what arrives */
     uint32_t taken, above, visible; /* samples: all, those above the horizon, those not hidden */
     uint32_t retries;               /* left */
 } light_sums;
