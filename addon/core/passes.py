@@ -17,9 +17,12 @@ from .relative import scale_of
 from .smoothing import TexelGrid, blurred, pooled, smoothed
 from .workers import within
 
-FIRST_RAYS = 2  # of a replicate, in the first pass, on MANY_TEXELS and more, whose neighbours vouch for them;
-FIRST_ALONE = 8  # elsewhere: fewer may miss what is bright and small, and not know it
-MANY_TEXELS = 1 << 16
+LEAST_FIRST, MOST_FIRST = (
+    2,
+    8,
+)  # rays of a replicate in the first pass: as many as neighbours vouch for, where there are
+MANY_TEXELS = 1 << 16  # and more; elsewhere the most, as few may miss what is bright and small, and not know it
+FIRST_ERROR = 0.07  # over the target, to a power of two, of MANY_TEXELS: a ray that is off by much leaves a blotch
 MOST_RAYS = 2048  # of a replicate
 MOST_COST = 15  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
@@ -110,7 +113,7 @@ def gather_until(
     """
     count, started = len(job.receivers), time.perf_counter()
     samples, probes = _Samples(count), None
-    active, further = np.arange(count), np.full(count, FIRST_RAYS if grid and count >= MANY_TEXELS else FIRST_ALONE)
+    active, further = np.arange(count), np.full(count, _first_rays(grid, count, error))
     budget, idle, extra, begin, rms = 0, 0, 0, 0.0, np.inf
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
@@ -143,6 +146,13 @@ def gather_until(
             found = found if is_asked else _denoised(denoise, grid, found, means, direct, probes)
             traced = samples.rays, probes.measured.rays
             return Gathered(job, found.values, found.rms, stopped, found.is_denoised, *traced)
+
+
+def _first_rays(grid, count, error) -> int:
+    """Rays of a replicate that all of ``count`` receivers start with."""
+    if grid is None or count < MANY_TEXELS:
+        return MOST_FIRST
+    return int(np.clip(2.0 ** round(np.log2(FIRST_ERROR / error)), LEAST_FIRST, MOST_FIRST))
 
 
 def _best_estimate(job: GatherJob, grid, means, near, taken, direct, probes: Probes) -> _Found:
