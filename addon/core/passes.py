@@ -17,12 +17,10 @@ from .relative import scale_of
 from .smoothing import TexelGrid, blurred, pooled, smoothed
 from .workers import within
 
-LEAST_FIRST, MOST_FIRST = (
-    2,
-    8,
-)  # rays of a replicate in the first pass: as many as neighbours vouch for, where there are
-MANY_TEXELS = 1 << 16  # and more; elsewhere the most, as few may miss what is bright and small, and not know it
-FIRST_ERROR = 0.07  # over the target, to a power of two, of MANY_TEXELS: a ray that is off by much leaves a blotch
+LEAST_FIRST = 2  # rays of a replicate in the first pass, where neighbours vouch for them: on
+MANY_TEXELS = 1 << 16  # and more; elsewhere
+MOST_FIRST = 8  # as fewer may miss what is bright and small, and not know it
+FIRST_ERROR = 0.07  # over the target, to a power of two, of MANY_TEXELS: of few rays one far off leaves a blotch
 MOST_RAYS = 2048  # of a replicate
 MOST_COST = 15  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
