@@ -22,7 +22,7 @@ MANY_TEXELS = 1 << 16  # and more; elsewhere
 MOST_FIRST = 8  # as fewer may miss what is bright and small, and not know it
 FIRST_ERROR = 0.07  # over the target, to a power of two, of MANY_TEXELS: of few rays one far off leaves a blotch
 MOST_RAYS = 2048  # of a replicate
-MOST_COST = 15  # times the rays of the first pass that all passes may take, and FREE_RAYS at least,
+MOST_COST = 15  # times the rays that LEAST_FIRST of each receiver take, that all passes may, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
@@ -111,14 +111,15 @@ def gather_until(
     """
     count, started = len(job.receivers), time.perf_counter()
     samples, probes = _Samples(count), None
-    active, further = np.arange(count), np.full(count, _first_rays(grid, count, error))
+    first = _first_rays(grid, count, error)
+    active, further = np.arange(count), np.full(count, first)
     budget, idle, extra, begin, rms = 0, 0, 0, 0.0, np.inf
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
         samples.add(job, active, further, seed, within(on_step, begin, width))
         begin += width
-        budget = budget or int(max(MOST_COST * samples.rays, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
+        budget = budget or _budget(samples.rays * LEAST_FIRST / first, error)
         means = samples.means
         near = None
         if grid:
@@ -151,6 +152,11 @@ def _first_rays(grid, count, error) -> int:
     if grid is None or count < MANY_TEXELS:
         return MOST_FIRST
     return int(np.clip(2.0 ** round(np.log2(FIRST_ERROR / error)), LEAST_FIRST, MOST_FIRST))
+
+
+def _budget(first_cost, error) -> int:
+    """Rays that all passes may take: ``first_cost`` is what LEAST_FIRST of each receiver take."""
+    return int(max(MOST_COST * first_cost, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
 
 
 def _best_estimate(job: GatherJob, grid, means, near, taken, direct, probes: Probes) -> _Found:
