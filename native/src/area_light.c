@@ -1,7 +1,6 @@
 /* Area lamps: rectangles and ellipses, one-sided. Radiometry as Cycles has it. SPDX-License-Identifier:
  * GPL-3.0-or-later */
 #include "light_kinds.h"
-#include "polygon.h"
 
 /* What a narrowed beam keeps of the radiance at an angle from the lamp's axis. */
 float spread_share(const area_light *light, float cosine) {
@@ -33,22 +32,29 @@ float area_of_lamp(const area_light *light) {
     return light->is_ellipse > 0 ? 0.25f * PL_PI * rectangle : rectangle;
 }
 
-/* Irradiance of a unit of radiance from a lamp that area_is_exact, where it faces the point. */
-float area_exact(const area_light *light, vec3 point, vec3 normal) {
-    vec3 corners[4];
-    area_corners(light, corners);
-    return PL_PI * (float)point_to_polygon(point, normal, corners, 4);
+light_face area_face(const area_light *light, vec3 point) {
+    light_face face = {.count = 4};
+    area_corners(light, face.corners);
+    if (area_faces(light, point)) {
+        face.radiance[0] = light->radiance.x;
+        face.radiance[1] = light->radiance.y;
+        face.radiance[2] = light->radiance.z;
+    }
+    return face;
 }
 
 /* Near an area lamp the closed form; from far away, it says no more than the square law at fifty times the cost. */
-float area_importance(const area_light *light, const float *radiance, vec3 point, vec3 normal, float ball) {
+float area_importance(const area_light *light, vec3 point, vec3 normal, float ball) {
     if (!area_faces(light, point))
         return 0;
     const float reach = 4 * vec3_length(vec3_add(light->axis_u, light->axis_v));
     const vec3 to = vec3_sub(light->centre, point);
     if (!area_is_exact(light) || vec3_dot(to, to) > reach * reach)
         return ball;
-    return luminance(radiance) * area_exact(light, point, normal);
+    const light_face face = area_face(light, point);
+    float rgb[3] = {0, 0, 0};
+    add_face(&face, point, normal, rgb);
+    return luminance(rgb);
 }
 
 bool sample_area(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out) {

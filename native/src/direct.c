@@ -8,12 +8,12 @@
  */
 #include "direct.h"
 
+#include "aimed_light.h"
 #include "sampling.h"
 
 #include <stdlib.h>
 
 enum { REPLICATES = 2 };
-enum { RETRIES = 32 }; /* of a sample that falls below the horizon, where one has to be found */
 
 typedef struct direct_job {
     const pl_scene *scene;
@@ -39,23 +39,6 @@ static size_t choose_light(const float *importances, size_t count, float total, 
     return chosen;
 }
 
-/*
- * The k-th sample of a light. Where the light has a closed form, samples only say which share of it is seen, so one
- * that falls below the horizon, or on a triangle's dark side, is drawn again, while there are retries left: else a
- * light of which no sample could shine would be lost.
- */
-static bool sample_above_horizon(const pl_lights *lights, vec3 point, vec3 normal, size_t light, uint32_t seed,
-                                 uint32_t k, uint32_t *io_retries, pl_light_sample *out_sample) {
-    const uint32_t retries = *io_retries < RETRIES ? *io_retries : RETRIES;
-    for (uint32_t try = 0; try <= retries; ++try) {
-        const uint32_t try_seed = try ? hash_pair(seed, 0x40000000u + try) : seed;
-        *io_retries -= try > 0;
-        if (light_sample(lights, light, point, normal, sobol(k, 0, try_seed), sobol(k, 1, try_seed), out_sample))
-            return true;
-    }
-    return false;
-}
-
 bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_light_balls *balls, float *importances,
                      vec3 origin, vec3 normal, uint32_t seed, float out_rgb[3]) {
     pl_light_sample sample;
@@ -64,16 +47,13 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
     if (total <= 0)
         return false;
     const size_t chosen = choose_light(importances, lights->count, total, sobol(0, 2, seed));
-    float exact[3];
-    const bool is_exact = light_exact(lights, chosen, origin, normal, exact);
-    uint32_t retries = is_exact ? RETRIES : 0;
-    if ((is_exact && luminance(exact) <= 0) ||
-        !sample_above_horizon(lights, origin, normal, chosen, seed, 0, &retries, &sample))
+    aimed_light aimed;
+    if (!aim(lights, chosen, origin, normal, &aimed) || !sample_aimed(&aimed, seed, 0, &sample))
         return false;
     /* the sample's own estimate has no bound close to a lamp: where there is a closed form the ray only says whether
        the lamp is seen */
-    for (int c = 0; is_exact && c < 3; ++c)
-        sample.irradiance[c] = exact[c];
+    for (int c = 0; aimed.is_exact && c < 3; ++c)
+        sample.irradiance[c] = aimed.exact[c];
     if (!is_occluded(scene, origin, sample.direction, sample.far)) {
         transmit(scene, origin, sample.direction, sample.far, sample.irradiance);
         for (int c = 0; c < 3; ++c)
@@ -106,20 +86,17 @@ static bool shine(direct_job *job, const pl_receiver_frame *frame, pl_light_samp
 }
 
 typedef struct light_sums {
-    float all[3], seen[3];          /* unoccluded, and what arrives */
-    uint32_t taken, above, visible; /* samples: all, those above the horizon, those not hidden */
-    uint32_t retries;               /* left */
+    float all[3], seen[3];   /* unoccluded, and what arrives */
+    uint32_t taken, visible; /* samples: all, those not hidden */
 } light_sums;
 
-static void sample_range(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t seed, uint32_t first,
-                         uint32_t end, light_sums *io_sums) {
+static void sample_range(direct_job *job, const pl_receiver_frame *frame, const aimed_light *aimed, uint32_t seed,
+                         uint32_t first, uint32_t end, light_sums *io_sums) {
     for (uint32_t k = first; k < end; ++k) {
         pl_light_sample sample;
         ++io_sums->taken;
-        if (!sample_above_horizon(job->lights, frame->origin, frame->shading, light, seed, k, &io_sums->retries,
-                                  &sample))
+        if (!sample_aimed(aimed, seed, k, &sample))
             continue;
-        ++io_sums->above;
         for (int c = 0; c < 3; ++c)
             io_sums->all[c] += sample.irradiance[c];
         if (!shine(job, frame, &sample))
@@ -154,26 +131,22 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
                     io_totals[r][c] += sample.irradiance[c];
         return;
     }
-    float exact[3];
-    const bool is_exact = light_exact(job->lights, light, frame->origin, frame->shading, exact);
-    if (is_exact && luminance(exact) <= 0)
+    aimed_light aimed;
+    if (!aim(job->lights, light, frame->origin, frame->shading, &aimed))
         return;
     const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
     const uint32_t few = most < 8 ? most : most * 3 / 8 < 8 ? 8 : most * 3 / 8;
-    /* a lamp that hardly rises above the horizon gives next to nothing: its samples are not worth RETRIES each */
-    const uint32_t retries = is_exact ? RETRIES + most : 0;
-    light_sums sums[REPLICATES] = {{.retries = retries}, {.retries = retries}};
-    uint32_t visible = 0, all = 0;
+    light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}};
+    uint32_t visible = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {
-        sample_range(job, frame, light, hash_pair(seed, r), 0, few, &sums[r]);
+        sample_range(job, frame, &aimed, hash_pair(seed, r), 0, few, &sums[r]);
         visible += sums[r].visible;
-        all += is_exact ? sums[r].above : sums[r].taken;
     }
     for (uint32_t r = 0; r < REPLICATES; ++r) {
         float rgb[3];
-        if (visible > 0 && visible < all)
-            sample_range(job, frame, light, hash_pair(seed, r), few, most, &sums[r]);
-        estimate(&sums[r], is_exact ? exact : NULL, rgb);
+        if (visible > 0 && visible < REPLICATES * few)
+            sample_range(job, frame, &aimed, hash_pair(seed, r), few, most, &sums[r]);
+        estimate(&sums[r], aimed.is_exact ? aimed.exact : NULL, rgb);
         for (int c = 0; c < 3; ++c)
             io_totals[r][c] += rgb[c];
     }

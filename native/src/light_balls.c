@@ -83,7 +83,7 @@ static float special_importance(const pl_lights *lights, size_t light, vec3 poin
         const area_light lamp = area_of(p);
         if (!closely)
             return ball > 0 && area_faces(&lamp, point) ? ball : 0;
-        return ball > 0 ? area_importance(&lamp, p + 3, point, normal, ball) : 0;
+        return ball > 0 ? area_importance(&lamp, point, normal, ball) : 0;
     }
     case PL_LIGHT_MESH:
         return !closely ? ball : ball > 0 ? mesh_importance(lights, p, point, normal, ball) : 0;

@@ -6,6 +6,13 @@
 
 enum { EXACT_TRIANGLES = 8 }; /* a mesh light of no more is summed exactly: Lambert's formula is 0.2 us */
 
+/* A flat piece of a lamp, of 3 or 4 corners, as a point sees it: of no radiance where that is its dark side. */
+typedef struct light_face {
+    vec3 corners[4];
+    int count;
+    float radiance[3];
+} light_face;
+
 typedef struct point_light {
     vec3 position, intensity;
     float radius, is_soft;
@@ -40,6 +47,12 @@ static inline const float *parameters_of(const pl_lights *lights, size_t light) 
     return lights->parameters + PL_LIGHT_FLOATS * light;
 }
 
+/* The flat pieces of a lamp whose light has a closed form: how many, 0 of one that has none. */
+size_t light_faces(const pl_lights *lights, size_t light, vec3 point, light_face out_faces[EXACT_TRIANGLES]);
+
+/* Add what arrives of a face, unoccluded. */
+void add_face(const light_face *face, vec3 point, vec3 normal, float io_rgb[3]);
+
 static inline void scaled(const float rgb[3], float factor, float out_rgb[3]) {
     for (int k = 0; k < 3; ++k)
         out_rgb[k] = rgb[k] * factor;
@@ -64,12 +77,12 @@ float spread_share(const area_light *light, float cosine);
 bool area_faces(const area_light *light, vec3 point);
 bool area_is_exact(const area_light *light);
 float area_of_lamp(const area_light *light);
-float area_exact(const area_light *light, vec3 point, vec3 normal);
-float area_importance(const area_light *light, const float *radiance, vec3 point, vec3 normal, float ball);
+light_face area_face(const area_light *light, vec3 point);
+float area_importance(const area_light *light, vec3 point, vec3 normal, float ball);
 bool sample_area(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out);
 
 /* mesh_light.c */
-void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 point, vec3 normal, float out_rgb[3]);
+light_face mesh_face(const pl_lights *lights, size_t triangle, vec3 point);
 float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float ball);
 bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float x, float y,
                  pl_light_sample *out);

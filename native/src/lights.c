@@ -1,5 +1,6 @@
 /* The table of lights: which kind each is decides what answers for it. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "light_kinds.h"
+#include "polygon.h"
 
 bool lights_are_valid(const pl_lights *lights) {
     for (size_t light = 0; light < lights->count; ++light) {
@@ -18,31 +19,31 @@ bool light_is_sharp(const pl_lights *lights, size_t light) {
     return (lights->kinds[light] == PL_LIGHT_POINT || lights->kinds[light] == PL_LIGHT_SUN) && p[6] <= 0;
 }
 
-static bool exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]) {
+size_t light_faces(const pl_lights *lights, size_t light, vec3 point, light_face out_faces[EXACT_TRIANGLES]) {
     const float *p = parameters_of(lights, light);
     if (lights->kinds[light] == PL_LIGHT_AREA) {
         const area_light lamp = area_of(p);
         if (!area_is_exact(&lamp))
-            return false;
-        scaled(p + 3, area_faces(&lamp, point) ? area_exact(&lamp, point, normal) : 0, out_rgb);
-        return true;
+            return 0;
+        out_faces[0] = area_face(&lamp, point);
+        return 1;
     }
-    if (lights->kinds[light] == PL_LIGHT_MESH) {
-        const mesh_light lamp = mesh_of(p);
-        if (lamp.count > EXACT_TRIANGLES)
-            return false;
-        mesh_exact(lights, &lamp, point, normal, out_rgb);
-        return true;
-    }
-    return false;
+    if (lights->kinds[light] != PL_LIGHT_MESH)
+        return 0;
+    const mesh_light lamp = mesh_of(p);
+    if (lamp.count > EXACT_TRIANGLES)
+        return 0;
+    for (size_t k = 0; k < lamp.count; ++k)
+        out_faces[k] = mesh_face(lights, lamp.first + k, point);
+    return lamp.count;
 }
 
-bool light_exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]) {
-    if (!exact(lights, light, point, normal, out_rgb))
-        return false;
+void add_face(const light_face *face, vec3 point, vec3 normal, float io_rgb[3]) {
+    if (luminance(face->radiance) <= 0)
+        return;
+    const float factor = PL_PI * (float)point_to_polygon(point, normal, face->corners, face->count);
     for (int k = 0; k < 3; ++k)
-        out_rgb[k] = bounded(out_rgb[k]);
-    return true;
+        io_rgb[k] += factor * face->radiance[k];
 }
 
 static bool sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float x, float y,

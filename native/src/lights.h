@@ -49,9 +49,6 @@ void light_balls_destroy(pl_light_balls *balls);
 float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal, bool closely,
                         float *out_importances);
 
-/* What a light gives unoccluded, in closed form; false where it has none. */
-bool light_exact(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float out_rgb[3]);
-
 /* A point of the light for (x, y) of the unit square; false where it cannot light the receiver. */
 bool light_sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float x, float y,
                   pl_light_sample *out_sample);

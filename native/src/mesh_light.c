@@ -1,6 +1,5 @@
 /* Glowing meshes. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "light_kinds.h"
-#include "polygon.h"
 
 /* Radiance of a glowing triangle towards the side that a point is on. */
 static const float *radiance_towards(const pl_lights *lights, size_t triangle, vec3 corner, vec3 twice_area,
@@ -9,19 +8,13 @@ static const float *radiance_towards(const pl_lights *lights, size_t triangle, v
     return lights->triangle_radiances + 6 * triangle + (is_front ? 0 : 3);
 }
 
-void mesh_exact(const pl_lights *lights, const mesh_light *light, vec3 point, vec3 normal, float out_rgb[3]) {
-    out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
-    for (size_t t = light->first; t < light->first + light->count; ++t) {
-        const float *c = lights->triangle_corners + 9 * t;
-        const vec3 corners[3] = {vec3_from(c), vec3_from(c + 3), vec3_from(c + 6)};
-        const vec3 twice_area = vec3_cross(vec3_sub(corners[1], corners[0]), vec3_sub(corners[2], corners[0]));
-        const float *radiance = radiance_towards(lights, t, corners[0], twice_area, point);
-        if (luminance(radiance) <= 0)
-            continue;
-        const float factor = PL_PI * (float)point_to_polygon(point, normal, corners, 3);
-        for (int k = 0; k < 3; ++k)
-            out_rgb[k] += factor * radiance[k];
-    }
+light_face mesh_face(const pl_lights *lights, size_t triangle, vec3 point) {
+    const float *c = lights->triangle_corners + 9 * triangle;
+    light_face face = {.corners = {vec3_from(c), vec3_from(c + 3), vec3_from(c + 6)}, .count = 3};
+    const vec3 *corners = face.corners;
+    const vec3 twice_area = vec3_cross(vec3_sub(corners[1], corners[0]), vec3_sub(corners[2], corners[0]));
+    scaled(radiance_towards(lights, triangle, corners[0], twice_area, point), 1, face.radiance);
+    return face;
 }
 
 float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float ball) {
@@ -29,8 +22,11 @@ float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 
     const vec3 to = vec3_sub(light.centre, point);
     if (light.count > EXACT_TRIANGLES || vec3_dot(to, to) > 16 * light.radius * light.radius)
         return ball;
-    float rgb[3];
-    mesh_exact(lights, &light, point, normal, rgb);
+    float rgb[3] = {0, 0, 0};
+    for (size_t t = light.first; t < light.first + light.count; ++t) {
+        const light_face face = mesh_face(lights, t, point);
+        add_face(&face, point, normal, rgb);
+    }
     return luminance(rgb);
 }
 

@@ -79,6 +79,24 @@ def test_an_area_lamp_lights_one_side_only(points):
     assert (values == 0).all()
 
 
+@pytest.mark.parametrize("glows", [False, True], ids=["lamp", "mesh"])
+@pytest.mark.parametrize("samples", [2, 8, 64])
+@pytest.mark.parametrize("risen", [0.5, 0.1, 0.003])
+def test_what_has_risen_of_a_lamp_shines_whole_however_little_that_is(glows, samples, risen):
+    """A panel through the floor, 3 m wide and high: of samples all over it, one in a thousand would be above."""
+    low, high = risen - 3, risen
+    points = np.stack([np.linspace(0.02, 1, 40), np.linspace(-1.4, 1.6, 40), np.zeros(40)], axis=1)
+    glow = Material("glow", (0, 0, 0), radiance=tuple(COLOUR))
+    parts = [rectangle((0, -1.5, low), (0, 3, 0), (0, 0, 3), material=glow)] if glows else []
+    lamp = AreaLight("lamp", (0, 0, low + 1.5), (0, 1.5, 0), (0, 0, 1.5), tuple(COLOUR))
+    values, variance = direct_light([] if glows else [lamp], points, parts, samples=samples)
+    corners = np.array([(0, -1.5, low), (0, 1.5, low), (0, 1.5, high), (0, -1.5, high)])
+    exact = np.pi * np.outer([point_to_polygon(p, UP, corners) for p in points], COLOUR)
+    # receivers stand 1e-5 m off a floor of 10 m, and the light of what has risen goes by the square of its height
+    assert values == pytest.approx(exact, rel=2.5e-5 / risen + SINGLE)
+    assert variance == pytest.approx(0, abs=1e-10)
+
+
 def test_a_disc_lamp_overhead():
     """E = pi L r^2 / (r^2 + h^2) below its middle."""
     lamp = AreaLight("lamp", (0, 0, 1.0), (0, 0.5, 0), (0.5, 0, 0), tuple(COLOUR), is_ellipse=True)
