@@ -16,7 +16,7 @@ from .passes import gather_until
 from .probes import SeenPoints, rms_of
 from .radiosity import Solved
 from .receivers import Receivers
-from .relative import scale_of
+from .relative import scale_of, scale_of_luminance
 from .smoothing import TexelGrid, blurred, pooled
 from .texel_light import TexelLight, split_where_blocked
 from .workers import within
@@ -37,7 +37,8 @@ class Irradiance:
     values : float32 (N, 3) E [W/m^2]
     relative_error : estimated RMS of the error over (E + 0.3 median E), luminance: over receivers, of a lightmap by how
         much of the surface looks each up
-    seen_error : the same at random points of the surfaces, looked up in the result as a viewer does
+    seen_error : the same at random points of the surfaces, looked up in the result as a viewer does, and relative to
+        the light that is there
     target_reached : whether sampling met its target
     stopped : what ended it, "" where nothing was left to do
     is_denoised : whether the denoiser's estimate was the better one
@@ -90,8 +91,9 @@ def gather_irradiance(
         replace(job, guides=guides), grid, direct.values, denoise, error, seed, seconds_left, within(on_step, 0.4, 0.6)
     )
     at_points = measure(gathered.job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
-    shown = seen.look_up(gathered.values)
-    seen_error = rms_of(at_points.squares_of(shown, scale_of(shown)))
+    # relative to what is there, not to what is shown: light that leaks into the dark has to count as all wrong
+    scale = scale_of_luminance(at_points.luminance)
+    seen_error = rms_of(at_points.squares_of(seen.look_up(gathered.values), scale))
     traced = {
         "direct": direct.rays,
         "gather": looks + learning + gathered.rays,

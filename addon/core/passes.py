@@ -17,12 +17,11 @@ from .relative import scale_of
 from .smoothing import TexelGrid, blurred, pooled, smoothed
 from .workers import within
 
-LEAST_FIRST = 2  # rays of a replicate in the first pass, where neighbours vouch for them: on
-MANY_TEXELS = 1 << 16  # and more; elsewhere
-MOST_FIRST = 8  # as fewer may miss what is bright and small, and not know it
-FIRST_ERROR = 0.07  # over the target, to a power of two, of MANY_TEXELS: of few rays one far off leaves a blotch
+LEAST_FIRST, MOST_FIRST = 2, 8  # rays of a replicate in the first pass: fewer may miss what is bright and small, and
+MANY_TEXELS = 1 << 16  # not know it, but of so many texels neighbours vouch for each other; all others begin with the most
+FIRST_ERROR = 0.07  # over the target is what many begin with, to a power of two: of few rays one far off leaves a blotch
 MOST_RAYS = 2048  # of a replicate
-MOST_COST = 15  # times the rays that LEAST_FIRST of each receiver take, that all passes may, and FREE_RAYS at least,
+MOST_COST = 15  # times what the fewest first rays cost may all passes, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
@@ -87,7 +86,10 @@ class _Samples:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """An estimate: irradiance (N, 3), its stated relative noise (N,), and its squared errors at the probes."""
+    """An estimate: irradiance (N, 3), its stated relative noise (N,), and its squared errors at the probes, weighted.
+
+    What the surface hardly looks up counts for little in both.
+    """
 
     values: np.ndarray
     noise: np.ndarray
@@ -111,7 +113,9 @@ def gather_until(
     """
     count, started = len(job.receivers), time.perf_counter()
     samples, probes = _Samples(count), None
-    first = _first_rays(grid, count, error)
+    fewest = LEAST_FIRST if grid and count >= MANY_TEXELS else MOST_FIRST
+    # in a hurry as few as may be: whoever is not done gets more
+    first = first_rays(fewest, error) if seconds_left() == np.inf else fewest
     active, further = np.arange(count), np.full(count, first)
     budget, idle, extra, begin, rms = 0, 0, 0, 0.0, np.inf
     while True:
@@ -119,7 +123,7 @@ def gather_until(
         width = 0.5 * (1 - begin)
         samples.add(job, active, further, seed, within(on_step, begin, width))
         begin += width
-        budget = budget or _budget(samples.rays * LEAST_FIRST / first, error)
+        budget = budget or ray_budget(samples.rays * fewest / first, error)
         means = samples.means
         near = None
         if grid:
@@ -147,16 +151,14 @@ def gather_until(
             return Gathered(job, found.values, found.rms, stopped, found.is_denoised, *traced)
 
 
-def _first_rays(grid, count, error) -> int:
-    """Rays of a replicate that all of ``count`` receivers start with."""
-    if grid is None or count < MANY_TEXELS:
-        return MOST_FIRST
-    return int(np.clip(2.0 ** round(np.log2(FIRST_ERROR / error)), LEAST_FIRST, MOST_FIRST))
+def first_rays(fewest, error) -> int:
+    """Rays of a replicate that all receivers start with."""
+    return int(np.clip(2.0 ** round(np.log2(FIRST_ERROR / error)), fewest, MOST_FIRST))
 
 
-def _budget(first_cost, error) -> int:
-    """Rays that all passes may take: ``first_cost`` is what LEAST_FIRST of each receiver take."""
-    return int(max(MOST_COST * first_cost, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
+def ray_budget(fewest_cost, error) -> int:
+    """Rays that all passes may take: ``fewest_cost`` is what the fewest first rays of each receiver take."""
+    return int(max(MOST_COST * fewest_cost, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
 
 
 def _best_estimate(job: GatherJob, grid, means, near, taken, direct, probes: Probes) -> _Found:
@@ -196,8 +198,8 @@ def _next(found: _Found, samples: _Samples, probes: Probes, error, rays_left, ra
         rays_left = min(rays_left, SPECKLE_SHARE * samples.rays)
     wanting, _ = next_pass(due, samples.taken, MOST_RAYS, samples.cost, np.inf)
     active, further = next_pass(due, samples.taken, MOST_RAYS, samples.cost, min(rays_left, rays_in_time))
-    if not len(wanting):
+    if len(wanting) and len(active) >= ENOUGH * len(wanting):
+        return active, further, None
+    if not len(wanting) or found.rms <= error:
         return active, further, ""
-    if len(active) < ENOUGH * len(wanting):
-        return active, further, "by the time limit" if rays_in_time < rays_left else "by the budget of rays"
-    return active, further, None
+    return active, further, "by the time limit" if rays_in_time < rays_left else "by the budget of rays"

@@ -31,7 +31,8 @@ DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic: where errors larger th
 PATCH_OF = 4  # each of which sees the light of its like where it can, and patches only near by
 COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
 ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
-LIGHTMAP_ERROR = 0.05  # at the least, that patches are solved to for a lightmap
+LIGHTMAP_ERROR = 0.05  # at the least, that patches are solved to where a lightmap has texels on
+MOST_AREA = 0.9  # of the scene: rays see these texels' own light, and patches only behind them and far off
 QUICK_ERROR = 0.2  # of the solutions that say where it does
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
@@ -66,15 +67,15 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     """Subdivide, measure direct light on the patches, solve for the light that bounces."""
     solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene))
     sky = np.asarray(exitance_from_radiance(scene.world_radiance), np.float32).reshape(1, 3)
+    has_texels = settings.target == "lightmap" and _target_share(scene) >= MOST_AREA
+    least_error = LIGHTMAP_ERROR if has_texels else 0.0
 
     def measure(patches, on_step, known=None):
         return measure_patches(scene, kernel, patches, emitters, sky, settings.seed, known, on_step)
 
     def solve(lit, error, on_step):
         emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
-        # a lightmap's rays see its texels' own light: patches only behind it and far off, a great many at a time
-        least = LIGHTMAP_ERROR if settings.target == "lightmap" else 0.0
-        precision = replace(settings, error=max(error, least))
+        precision = replace(settings, error=max(error, least_error))
         found = solve_patches(kernel, lit.patches, emitted, solver, method, precision, on_step)
         # no surface sends less than it emits: what overshooting or an iteration left below that is its error
         return replace(found, radiosity=np.maximum(found.radiosity, emitted))
@@ -105,6 +106,13 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     )
     sources = with_bright_sides(scene, kernel.centre, patches, emitters, solution.radiosity, bright)
     return Solved(field, emitters, sources, solution, method, choice, {"patches": lit.rays, "solve": solution.rays})
+
+
+def _target_share(scene: Scene) -> float:
+    """Of the scene's area, how much is baked."""
+    corners = scene.corners
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return sum(areas[obj.span].sum() for obj in scene.objects if obj.is_target) / max(areas.sum(), 1e-300)
 
 
 def _patch_budget(solver: str, settings: BakeSettings) -> int:

@@ -11,6 +11,10 @@ DARK = 0.3  # of the median irradiance: what is added to a point's own before it
 
 def scale_of(irradiance):
     """The luminance, and a share of its median where that is dark: irradiance (N, 3) -> (N,) [W/m^2]."""
-    luminance = irradiance @ LUMINANCE
+    return scale_of_luminance(irradiance @ LUMINANCE)
+
+
+def scale_of_luminance(luminance):
+    """The same of luminance (N,)."""
     lit = luminance[luminance > 1e-4 * max(luminance.mean(), 1e-30)]
     return luminance + DARK * (np.median(lit) if len(lit) else 1.0)

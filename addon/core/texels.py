@@ -57,7 +57,7 @@ class TexelMap:
         """
         rim = np.maximum(0.5 * np.maximum(1 - self.distances, 0) ** 2, LEAST_SHOWN)
         areas = np.where(self.is_inside, 1, rim).astype(np.float32)
-        return areas / max(areas.mean(), LEAST_SHOWN) if len(areas) else areas
+        return areas / areas.mean() if len(areas) else areas
 
 
 def texels(charts: Charts) -> TexelMap:

@@ -6,7 +6,7 @@
 
 static const float PL_PI = 3.14159265358979f;
 
-/* fminf and fmaxf mind NaNs, and are calls. Of a value that is none, these take the bound. */
+/* fminf and fmaxf are calls. Of a value that is not a number these take the bound, which has to be one. */
 static inline float lesser(float value, float bound) { return value < bound ? value : bound; }
 static inline float greater(float value, float bound) { return value > bound ? value : bound; }
 

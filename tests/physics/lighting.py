@@ -42,7 +42,7 @@ def direct_light(lights, points, parts=(), samples=64, seed=0, threads=1):
 
 def full_light(scene, receivers, threads=2, grid=None, **settings):
     """Irradiance of the whole pipeline at receivers: a gather.Irradiance, and the Solved. ``grid``: of a lightmap."""
-    settings = BakeSettings(**settings)
+    settings = BakeSettings(**{"target": "lightmap" if grid else "vertex", **settings})
     with kernel_of(scene, threads) as kernel:
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, settings, lambda done: None)
