@@ -1,17 +1,17 @@
 /* A light as one receiver samples it. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "aimed_light.h"
 
-#include "sampling.h"
+/* Lamps that are larger from here are sampled by solid angle [sr]. One sample alone has to stay below what a hemisphere
+   of the lamp's radiance would give; many are spread better over the area, until only what is nearest counts. */
+static const float large_for_one = 0.01f, large_for_many = 2.5f;
 
-/* Whether some of the faces are below the horizon or dark. */
-static bool are_cut(const light_face *faces, size_t count, vec3 point, vec3 normal) {
-    for (size_t k = 0; k < count; ++k) {
-        if (luminance(faces[k].radiance) <= 0)
+/* Whether some of a face is below the horizon or dark. */
+static bool is_cut(const light_face *face, vec3 point, vec3 normal) {
+    if (luminance(face->radiance) <= 0)
+        return true;
+    for (int corner = 0; corner < face->count; ++corner)
+        if (vec3_dot(vec3_sub(face->corners[corner], point), normal) <= 0)
             return true;
-        for (int corner = 0; corner < faces[k].count; ++corner)
-            if (vec3_dot(vec3_sub(faces[k].corners[corner], point), normal) <= 0)
-                return true;
-    }
     return false;
 }
 
@@ -29,64 +29,98 @@ static int clip_face(const light_face *face, vec3 point, vec3 normal, vec3 out_c
     return clipped;
 }
 
+/* Of the triangle between three unit directions (Van Oosterom & Strackee 1983, eq. 8) [sr]. */
+static float solid_angle(const vec3 seen[3]) {
+    const float volume = fabsf(vec3_dot(seen[0], vec3_cross(seen[1], seen[2])));
+    return 2 * atan2f(volume, 1 + vec3_dot(seen[0], seen[1]) + vec3_dot(seen[1], seen[2]) + vec3_dot(seen[2], seen[0]));
+}
+
 static void add_risen(const light_face *face, aimed_light *io_aimed) {
     vec3 corners[5];
     const int count = clip_face(face, io_aimed->point, io_aimed->normal, corners);
     for (int i = 2; i < count; ++i) {
-        risen_triangle risen = {
-            .a = corners[0], .ab = vec3_sub(corners[i - 1], corners[0]), .ac = vec3_sub(corners[i], corners[0])};
-        const vec3 across = vec3_cross(risen.ab, risen.ac);
+        const vec3 a = corners[0], b = corners[i - 1], c = corners[i], point = io_aimed->point;
+        const vec3 across = vec3_cross(vec3_sub(b, a), vec3_sub(c, a));
         const float twice = vec3_length(across);
-        if (twice <= 0)
+        if (!(twice > 0))
             continue;
-        const bool is_front = vec3_dot(across, vec3_sub(io_aimed->point, corners[0])) >= 0;
-        risen.normal = vec3_scale(across, (is_front ? 1 : -1) / twice);
-        risen.area = 0.5f * twice;
-        scaled(face->radiance, 1, risen.radiance);
-        io_aimed->power += risen.area * luminance(risen.radiance);
-        io_aimed->triangles[io_aimed->count++] = risen;
+        const bool is_front = vec3_dot(across, vec3_sub(point, a)) >= 0;
+        risen_triangle *risen = io_aimed->triangles + io_aimed->count++;
+        risen->a = a;
+        risen->ab = vec3_sub(b, a);
+        risen->ac = vec3_sub(c, a);
+        risen->normal = vec3_scale(across, (is_front ? 1 : -1) / twice);
+        risen->area = 0.5f * twice;
+        scaled(face->radiance, 1, risen->radiance);
+        risen->seen[0] = vec3_unit(vec3_sub(a, point));
+        risen->seen[1] = vec3_unit(vec3_sub(b, point));
+        risen->seen[2] = vec3_unit(vec3_sub(c, point));
+        risen->angle = solid_angle(risen->seen);
     }
 }
 
-bool aim(const pl_lights *lights, size_t light, vec3 point, vec3 normal, aimed_light *out) {
-    light_face faces[EXACT_TRIANGLES];
-    const size_t count = light_faces(lights, light, point, faces);
+bool aim(const pl_lights *lights, size_t light, vec3 point, vec3 normal, bool once, aimed_light *out) {
+    bool cut = false;
+    float angle = 0;
     out->lights = lights;
     out->light = light;
     out->point = point;
     out->normal = normal;
-    out->is_exact = count > 0;
-    out->is_cut = are_cut(faces, count, point, normal);
-    for (int c = 0; c < 3; ++c)
-        out->exact[c] = 0;
-    for (size_t k = 0; k < count; ++k)
-        add_face(faces + k, point, normal, out->exact);
-    for (int c = 0; c < 3; ++c)
-        out->exact[c] = bounded(out->exact[c]);
-    out->power = 0;
+    out->face_count = light_faces(lights, light, point, out->faces);
+    out->way = BY_LIGHT;
+    if (!out->face_count)
+        return true;
+
     out->count = 0;
-    for (size_t k = 0; out->is_cut && k < count; ++k)
-        if (luminance(faces[k].radiance) > 0)
-            add_risen(faces + k, out);
-    return !out->is_exact || (luminance(out->exact) > 0 && (!out->is_cut || out->power > 0));
+    for (size_t k = 0; k < out->face_count; ++k) {
+        cut = cut || is_cut(out->faces + k, point, normal);
+        if (luminance(out->faces[k].radiance) > 0)
+            add_risen(out->faces + k, out);
+    }
+    for (size_t k = 0; k < out->count; ++k)
+        angle += out->triangles[k].angle;
+    if (angle > (once ? large_for_one : large_for_many))
+        out->way = BY_ANGLE;
+    else if (cut)
+        out->way = BY_AREA;
+    out->weight = 0;
+    for (size_t k = 0; k < out->count; ++k) {
+        const risen_triangle *risen = out->triangles + k;
+        out->weights[k] = luminance(risen->radiance) * (out->way == BY_ANGLE ? risen->angle : risen->area);
+        out->weight += out->weights[k];
+    }
+    return out->weight > 0;
 }
 
-/* A point of the triangles for (x, y) of the unit square, by what they emit. */
-static bool sample_risen(const aimed_light *aimed, float x, float y, pl_light_sample *out) {
-    float passed = x * aimed->power, emitted = 0;
-    const risen_triangle *risen = aimed->triangles;
-    for (size_t k = 0; k < aimed->count; ++k, passed -= emitted) {
-        risen = aimed->triangles + k;
-        emitted = risen->area * luminance(risen->radiance);
-        if (passed < emitted)
-            break;
-    }
-    const float width = sqrtf(lesser(greater(passed / emitted, 0), 1));
-    vec3 target = vec3_mul_add(risen->ab, width * (1 - y), vec3_mul_add(risen->ac, width * y, risen->a));
-    /* off the face, which is an occluder too, towards the receiver */
+void aimed_exact(const aimed_light *aimed, float out_rgb[3]) {
+    out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
+    for (size_t k = 0; k < aimed->face_count; ++k)
+        add_face(aimed->faces + k, aimed->point, aimed->normal, out_rgb);
+    for (int c = 0; c < 3; ++c)
+        out_rgb[c] = bounded(out_rgb[c]);
+}
+
+/* The triangle whose share of the weights x falls into; x becomes its place in that share. */
+static const risen_triangle *choose_risen(const aimed_light *aimed, float *io_x) {
+    float passed = *io_x * aimed->weight;
+    size_t k = 0;
+    while (k + 1 < aimed->count && passed >= aimed->weights[k])
+        passed -= aimed->weights[k++];
+    *io_x = lesser(greater(passed / greater(aimed->weights[k], 1e-30f), 0), 1);
+    return aimed->triangles + k;
+}
+
+/* To a point of a face, moved off it towards the receiver: the face is an occluder, too. */
+static void aim_at(const aimed_light *aimed, const risen_triangle *risen, vec3 target, pl_light_sample *out) {
     target = vec3_mul_add(risen->normal, rounding_of(target), target);
     out->direction = vec3_sub(target, aimed->point);
     out->far = far_of_face;
+}
+
+static bool sample_by_area(const aimed_light *aimed, float x, float y, pl_light_sample *out) {
+    const risen_triangle *risen = choose_risen(aimed, &x);
+    const float width = sqrtf(x);
+    aim_at(aimed, risen, vec3_mul_add(risen->ab, width * (1 - y), vec3_mul_add(risen->ac, width * y, risen->a)), out);
     const float lamp_height = -vec3_dot(out->direction, risen->normal);
     const float height = vec3_dot(out->direction, aimed->normal);
     if (height <= 0 || lamp_height <= 0)
@@ -94,15 +128,53 @@ static bool sample_risen(const aimed_light *aimed, float x, float y, pl_light_sa
     /* cosines are heights by the distance, of which each takes one off the square law */
     const float inverse_square = 1 / vec3_dot(out->direction, out->direction);
     const float factor = height * inverse_square * (lamp_height * inverse_square);
-    scaled(risen->radiance, factor * (aimed->power / luminance(risen->radiance)), out->irradiance);
+    scaled(risen->radiance, factor * (aimed->weight / luminance(risen->radiance)), out->irradiance);
     for (int c = 0; c < 3; ++c)
         out->irradiance[c] = bounded(out->irradiance[c]);
     return true;
 }
 
-bool sample_aimed(const aimed_light *aimed, uint32_t seed, uint32_t k, pl_light_sample *out_sample) {
-    const float x = sobol(k, 0, seed), y = sobol(k, 1, seed);
-    if (aimed->is_cut)
-        return sample_risen(aimed, x, y, out_sample);
-    return light_sample(aimed->lights, aimed->light, aimed->point, aimed->normal, x, y, out_sample);
+/* The unit vector in the plane of two that is at right angles to the first. */
+static vec3 across_from(vec3 first, vec3 second) {
+    return vec3_unit(vec3_mul_add(first, -vec3_dot(first, second), second));
+}
+
+/* A direction, even over a triangle's solid angle (Arvo 1995, "Stratified sampling of spherical triangles"). */
+static vec3 direction_within(const risen_triangle *risen, float x, float y) {
+    const vec3 a = risen->seen[0], b = risen->seen[1], to_c = across_from(a, risen->seen[2]);
+    const float cos_alpha = lesser(greater(vec3_dot(across_from(a, b), to_c), -1), 1);
+    const float sin_alpha = sqrtf(greater(1 - cos_alpha * cos_alpha, 1e-12f));
+    /* the arc from b to a point of the arc from a to c cuts off x of the angle */
+    const float turn = x * risen->angle - acosf(cos_alpha);
+    const float s = sinf(turn), t = cosf(turn);
+    const float u = t - cos_alpha, v = s + sin_alpha * vec3_dot(a, b);
+    const float below = (v * s + u * t) * sin_alpha;
+    const float cosine = fabsf(below) > 1e-20f ? ((v * t - u * s) * cos_alpha - v) / below : 1;
+    const float q = lesser(greater(cosine, -1), 1);
+    const vec3 cut = vec3_mul_add(to_c, sqrtf(1 - q * q), vec3_scale(a, q));
+    const float z = 1 - y * (1 - vec3_dot(cut, b));
+    return vec3_mul_add(across_from(b, cut), sqrtf(greater(1 - z * z, 0)), vec3_scale(b, z));
+}
+
+static bool sample_by_angle(const aimed_light *aimed, float x, float y, pl_light_sample *out) {
+    const risen_triangle *risen = choose_risen(aimed, &x);
+    const vec3 direction = direction_within(risen, x, y);
+    const float slope = vec3_dot(direction, risen->normal), cosine = vec3_dot(direction, aimed->normal);
+    if (slope >= 0 || cosine <= 0)
+        return false;
+    const float distance = vec3_dot(vec3_sub(risen->a, aimed->point), risen->normal) / slope;
+    aim_at(aimed, risen, vec3_mul_add(direction, distance, aimed->point), out);
+    scaled(risen->radiance, cosine * (aimed->weight / luminance(risen->radiance)), out->irradiance);
+    return true;
+}
+
+bool sample_aimed(const aimed_light *aimed, float x, float y, pl_light_sample *out_sample) {
+    switch (aimed->way) {
+    case BY_ANGLE:
+        return sample_by_angle(aimed, x, y, out_sample);
+    case BY_AREA:
+        return sample_by_area(aimed, x, y, out_sample);
+    default:
+        return light_sample(aimed->lights, aimed->light, aimed->point, aimed->normal, x, y, out_sample);
+    }
 }

@@ -11,28 +11,35 @@ enum { MOST_RISEN = 2 * EXACT_TRIANGLES };
 typedef struct risen_triangle {
     vec3 a, ab, ac, normal; /* unit, towards the receiver */
     float area, radiance[3];
+    vec3 seen[3]; /* unit directions to its corners */
+    float angle;  /* [sr] */
 } risen_triangle;
 
 /*
- * Where a light has a closed form, samples only say which share of it is seen. Then all have to fall on what is above
- * the horizon and shines this way: where little has risen, samples of the whole light would all be lost.
+ * Of a lamp with a closed form only what is above the horizon and shines this way is sampled: where little has risen,
+ * samples of the whole would all be lost. What is large from here is sampled by solid angle: of a lamp's area only
+ * the little that is nearest counts, which few samples find.
  */
 typedef struct aimed_light {
     const pl_lights *lights;
     size_t light;
     vec3 point, normal;
-    bool is_exact; /* has a closed form */
-    bool is_cut;   /* has, and only a part of it can shine: the triangles */
-    float exact[3];
-    float power; /* the triangles' areas times luminance of their radiance */
+    light_face faces[EXACT_TRIANGLES];
+    size_t face_count; /* 0: it has no closed form */
+    enum { BY_LIGHT, BY_AREA, BY_ANGLE } way;
     size_t count;
     risen_triangle triangles[MOST_RISEN];
+    float weights[MOST_RISEN]; /* of the triangles: luminance of radiance by area or angle */
+    float weight;              /* their sum */
 } aimed_light;
 
-/* False where the light gives the receiver nothing. */
-bool aim(const pl_lights *lights, size_t light, vec3 point, vec3 normal, aimed_light *out);
+/* For one sample or many; false where the light gives the receiver nothing. */
+bool aim(const pl_lights *lights, size_t light, vec3 point, vec3 normal, bool once, aimed_light *out);
 
-/* The k-th sample of a sequence; false where it falls on what cannot shine. */
-bool sample_aimed(const aimed_light *aimed, uint32_t seed, uint32_t k, pl_light_sample *out_sample);
+/* What arrives unoccluded, in closed form. */
+void aimed_exact(const aimed_light *aimed, float out_rgb[3]);
+
+/* A sample for (x, y) of the unit square, without bias by itself; false where it falls on what cannot shine. */
+bool sample_aimed(const aimed_light *aimed, float x, float y, pl_light_sample *out_sample);
 
 #endif

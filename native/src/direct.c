@@ -48,12 +48,9 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
         return false;
     const size_t chosen = choose_light(importances, lights->count, total, sobol(0, 2, seed));
     aimed_light aimed;
-    if (!aim(lights, chosen, origin, normal, &aimed) || !sample_aimed(&aimed, seed, 0, &sample))
+    if (!aim(lights, chosen, origin, normal, true, &aimed) ||
+        !sample_aimed(&aimed, sobol(0, 0, seed), sobol(0, 1, seed), &sample))
         return false;
-    /* the sample's own estimate has no bound close to a lamp: where there is a closed form the ray only says whether
-       the lamp is seen */
-    for (int c = 0; aimed.is_exact && c < 3; ++c)
-        sample.irradiance[c] = aimed.exact[c];
     if (!is_occluded(scene, origin, sample.direction, sample.far)) {
         transmit(scene, origin, sample.direction, sample.far, sample.irradiance);
         for (int c = 0; c < 3; ++c)
@@ -95,7 +92,7 @@ static void sample_range(direct_job *job, const pl_receiver_frame *frame, const 
     for (uint32_t k = first; k < end; ++k) {
         pl_light_sample sample;
         ++io_sums->taken;
-        if (!sample_aimed(aimed, seed, k, &sample))
+        if (!sample_aimed(aimed, sobol(k, 0, seed), sobol(k, 1, seed), &sample))
             continue;
         for (int c = 0; c < 3; ++c)
             io_sums->all[c] += sample.irradiance[c];
@@ -132,8 +129,10 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
         return;
     }
     aimed_light aimed;
-    if (!aim(job->lights, light, frame->origin, frame->shading, &aimed))
+    if (!aim(job->lights, light, frame->origin, frame->shading, false, &aimed))
         return;
+    float exact[3];
+    aimed_exact(&aimed, exact);
     const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
     const uint32_t few = most < 8 ? most : most * 3 / 8 < 8 ? 8 : most * 3 / 8;
     light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}};
@@ -146,7 +145,7 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
         float rgb[3];
         if (visible > 0 && visible < REPLICATES * few)
             sample_range(job, frame, &aimed, hash_pair(seed, r), few, most, &sums[r]);
-        estimate(&sums[r], aimed.is_exact ? aimed.exact : NULL, rgb);
+        estimate(&sums[r], aimed.face_count ? exact : NULL, rgb);
         for (int c = 0; c < 3; ++c)
             io_totals[r][c] += rgb[c];
     }
