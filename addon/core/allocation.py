@@ -32,14 +32,15 @@ def measured_errors(relative, chosen, squares):
     return relative * np.interp(relative, stated, ratio)
 
 
-def rays_due(errors, taken, target):
+def rays_due(errors, taken, target, power=1.0):
     """Rays (N,) of a replicate that each receiver is due, for the RMS of all errors to be the target at least cost.
 
-    In proportion to the noise of one ray (Neyman 1934, "optimum allocation"): with n_i rays the mean square is
-    sum(s_i^2 / n_i) / N, s_i^2 = errors^2 * taken.
+    Where the square of an error falls as 1 / rays^power, with n_i rays the mean square is sum(s_i / n_i^power) / N,
+    s_i = errors^2 * taken^power, which is least for its rays where n_i is in proportion to s_i^(1 / (1 + power)): for a
+    power of 1 to the noise of one ray (Neyman 1934, "optimum allocation").
     """
-    noise = errors * np.sqrt(taken)
-    return noise * (noise.sum() / (len(noise) * target**2))
+    share = (errors**2 * taken**power) ** (1 / (1 + power))
+    return share * (share.sum() / (len(share) * target**2)) ** (1 / power)
 
 
 def next_pass(due, taken, most, cost, rays_left):

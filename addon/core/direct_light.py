@@ -15,6 +15,7 @@ LEAST_FIRST = 16  # ... but no fewer: with its neighbours' a receiver then has h
 MOST_SAMPLES = 4096
 SHARE = 0.6  # of the error that direct light may have
 PASSES = 2  # after the first look; its noise says well what is due, and a second one mends what it missed
+EVENNESS = 4 / 3  # shadow rays are spread so evenly that the square of their error falls as 1 / rays to this power
 GROWTH = 2  # times the rays it has, that a receiver must be due to go on
 
 
@@ -66,7 +67,7 @@ def refined_direct(
         noise = np.sqrt(weights * np.minimum(pooled(of_one_ray) / samples, 1.0))
         if np.sqrt(np.mean(noise**2)) <= SHARE * error:
             break
-        due = np.minimum(rays_due(noise, samples, SHARE * error), MOST_SAMPLES)
+        due = np.minimum(rays_due(noise, samples, SHARE * error, EVENNESS), MOST_SAMPLES)
         wanted = 2 ** np.ceil(np.log2(np.maximum(due, 1))).astype(np.int64)
         wanted[wanted < GROWTH * samples] = 0
         # half of what is left of the bar for each pass
