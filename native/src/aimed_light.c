@@ -156,15 +156,36 @@ static vec3 direction_within(const risen_triangle *risen, float x, float y) {
     return vec3_mul_add(across_from(b, cut), sqrtf(greater(1 - z * z, 0)), vec3_scale(b, z));
 }
 
+/* A number in [0, 1] whose density goes from one weight to the other. */
+static float between(float x, float low, float high) {
+    return x * (low + high) / (low + sqrtf(low * low + x * (high * high - low * low)));
+}
+
+/*
+ * (x, y) moved to where they lead to directions of large cosines; returns the density there. What direction_within
+ * makes of the unit square's corners are b, b, a and c; in between cosines are about bilinear.
+ */
+static float prefer_cosines(const risen_triangle *risen, vec3 normal, float *io_x, float *io_y) {
+    const float a = greater(vec3_dot(risen->seen[0], normal), 0.01f);
+    const float b = greater(vec3_dot(risen->seen[1], normal), 0.01f);
+    const float c = greater(vec3_dot(risen->seen[2], normal), 0.01f);
+    const float y = between(*io_y, 2 * b, a + c);
+    const float x = between(*io_x, b + y * (a - b), b + y * (c - b));
+    *io_x = x;
+    *io_y = y;
+    return 4 * ((1 - y) * b + y * ((1 - x) * a + x * c)) / (a + 2 * b + c);
+}
+
 static bool sample_by_angle(const aimed_light *aimed, float x, float y, pl_light_sample *out) {
     const risen_triangle *risen = choose_risen(aimed, &x);
+    const float density = prefer_cosines(risen, aimed->normal, &x, &y);
     const vec3 direction = direction_within(risen, x, y);
     const float slope = vec3_dot(direction, risen->normal), cosine = vec3_dot(direction, aimed->normal);
     if (slope >= 0 || cosine <= 0)
         return false;
     const float distance = vec3_dot(vec3_sub(risen->a, aimed->point), risen->normal) / slope;
     aim_at(aimed, risen, vec3_mul_add(direction, distance, aimed->point), out);
-    scaled(risen->radiance, cosine * (aimed->weight / luminance(risen->radiance)), out->irradiance);
+    scaled(risen->radiance, cosine * (aimed->weight / luminance(risen->radiance)) / density, out->irradiance);
     return true;
 }
 

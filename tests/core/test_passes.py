@@ -65,4 +65,6 @@ def test_a_target_that_is_missed_names_what_ran_out():
     assert _next(found, samples, probes, 0.02, few, np.inf)[2] == "by the budget of rays"
     assert _next(found, samples, probes, 0.02, 1e12, few)[2] == "by the time limit"
     active, further, stopped = _next(found, samples, probes, 0.02, 1e12, np.inf)
-    assert stopped is None and len(active) == COUNT and (further[active] >= 8).all()
+    assert stopped is None
+    assert len(active) == COUNT
+    assert (further[active] >= 8).all()
