@@ -14,6 +14,7 @@
 #include <stdlib.h>
 
 enum { REPLICATES = 2 };
+enum { FEW = 8 }; /* samples of a replicate: as many tell whether a lamp is all seen or all hidden */
 
 typedef struct direct_job {
     const pl_scene *scene;
@@ -116,6 +117,19 @@ static void estimate(const light_sums *sums, const float *exact, float out_rgb[3
     }
 }
 
+/*
+ * The same from few samples, which say too little of the share that is seen. What is hidden is taken off the closed
+ * form, or what is seen is all there is: whichever the other replicate's samples find more likely, as a choice by its
+ * own would favour what it happens to see.
+ */
+static void estimate_from_few(const light_sums *sums, const light_sums *other, const float *exact, float out_rgb[3]) {
+    const bool most_seen = exact && 2 * other->visible > other->taken;
+    for (int c = 0; c < 3; ++c) {
+        const float hidden = sums->all[c] - sums->seen[c];
+        out_rgb[c] = most_seen ? exact[c] - hidden / (float)sums->taken : sums->seen[c] / (float)sums->taken;
+    }
+}
+
 /* A light of its own rays: few where it is all seen or all hidden, the full number in its penumbra. */
 static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t samples,
                              uint32_t seed, float io_totals[REPLICATES][3]) {
@@ -129,12 +143,12 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
         return;
     }
     aimed_light aimed;
-    if (!aim(job->lights, light, frame->origin, frame->shading, false, &aimed))
+    const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
+    if (!aim(job->lights, light, frame->origin, frame->shading, most < FEW, &aimed))
         return;
     float exact[3];
     aimed_exact(&aimed, exact);
-    const uint32_t most = samples / REPLICATES < 1 ? 1 : samples / REPLICATES;
-    const uint32_t few = most < 8 ? most : most * 3 / 8 < 8 ? 8 : most * 3 / 8;
+    const uint32_t few = most < FEW ? most : most * 3 / 8 < FEW ? FEW : most * 3 / 8;
     light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}};
     uint32_t visible = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {
@@ -145,7 +159,10 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
         float rgb[3];
         if (visible > 0 && visible < REPLICATES * few)
             sample_range(job, frame, &aimed, hash_pair(seed, r), few, most, &sums[r]);
-        estimate(&sums[r], aimed.face_count ? exact : NULL, rgb);
+        if (most < FEW)
+            estimate_from_few(&sums[r], &sums[1 - r], aimed.face_count ? exact : NULL, rgb);
+        else
+            estimate(&sums[r], aimed.face_count ? exact : NULL, rgb);
         for (int c = 0; c < 3; ++c)
             io_totals[r][c] += rgb[c];
     }

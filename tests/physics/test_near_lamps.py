@@ -13,6 +13,7 @@ from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
 from addon.core.scene import AreaLight, Material
 from addon.core.settings import BakeSettings
+from tests.physics.lighting import direct_light
 from tests.reference.polygon import point_to_polygon
 from tests.scenes import BLACK, kernel_of, rectangle, scene_of
 
@@ -70,3 +71,16 @@ def test_light_bounced_off_a_floor_beside_a_half_hidden_lamp(glows, hidden_below
     assert (np.abs(errors) < tolerance).all(), errors / exact
     # a ray's sample is no larger than the whole hemisphere's light would be: 2^16 of them, of twice the mean each
     assert np.sqrt(variance.mean()) < 2 * 2 * exact.mean() / 256
+
+
+@pytest.mark.parametrize("x", [0.2, 0.5])
+@pytest.mark.parametrize("samples", [1, 4, 8, 14])
+def test_few_shadow_rays_favour_neither_what_they_see_nor_what_is_hidden(samples, x):
+    """Patches have hardly any: of a floor beside a lamp whose nearer half is hidden they made 2.5 times the light."""
+    points = np.tile([x, 0.1, 0.0], (20000, 1))
+    board = rectangle((HAIR / 2, -2, 0), (0, 4, 0), (0, 0, 0.5), material=BLACK, name="board")
+    lamp = AreaLight("lamp", (0, 0, 0.5), (0, 1, 0), (0, 0, 0.5), (1.0, 1.0, 1.0))
+    values, variance = direct_light([lamp], points, [board], samples=samples)
+    exact = np.pi * point_to_polygon(points[0], UP, [(0, -1, 0.5), (0, 1, 0.5), (0, 1, 1), (0, -1, 1)])
+    # four standard errors of the mean, as two replicates each state them; what would be below 0 counts as 0
+    assert values[:, 0].mean() == pytest.approx(exact, abs=4 * np.sqrt(variance.mean() / len(points)) + 5e-3 * exact)
