@@ -13,7 +13,7 @@ from .workers import within
 FIRST = 1 / 4  # of the shadow rays of a penumbra, for the first look at direct light, ...
 LEAST_FIRST = 16  # ... but no fewer: with its neighbours' a receiver then has hundreds, and they know what is hidden
 MOST_SAMPLES = 4096
-SHARE = 0.6  # of the error that direct light may have
+SHARE = 0.55  # of the error that direct light may have
 PASSES = 2  # after the first look; its noise says well what is due, and a second one mends what it missed
 EVENNESS = 4 / 3  # shadow rays are spread so evenly that the square of their error falls as 1 / rays to this power
 GROWTH = 2  # times the rays it has, that a receiver must be due to go on
