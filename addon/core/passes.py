@@ -19,9 +19,7 @@ from .workers import within
 
 LEAST_FIRST, MOST_FIRST = 2, 8  # rays of a replicate in the first pass; few may miss what is bright and small, and
 MANY_TEXELS = 1 << 16  # not know it, but of so many texels neighbours vouch for each other: others begin with the most
-FIRST_ERROR = (
-    0.07  # over the target is what they begin with, to a power of two: of few rays one far off leaves a blotch
-)
+FIRST_ERROR = 0.07  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
 MOST_RAYS = 2048  # of a replicate
 MOST_COST = 15  # times what the fewest first rays cost may all passes, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
