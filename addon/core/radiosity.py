@@ -16,7 +16,7 @@ from .kernel import KernelScene
 from .parted import finer_where_parted
 from .patch_light import PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
-from .patches import cut, grid_of, patch_size_for, subdivide
+from .patches import cut, grid_of, patch_size_for, subdivide, triangle_areas
 from .progressive import solve_progressive
 from .scene import Scene, exitance_from_radiance
 from .settings import BakeSettings
@@ -110,8 +110,7 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
 
 def _target_share(scene: Scene) -> float:
     """Of the scene's area, how much is baked."""
-    corners = scene.corners
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = triangle_areas(scene)
     return sum(areas[obj.span].sum() for obj in scene.objects if obj.is_target) / max(areas.sum(), 1e-300)
 
 

@@ -1,6 +1,8 @@
 /* A light as one receiver samples it. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "aimed_light.h"
 
+#include "polygon.h"
+
 /* Lamps that are larger from here are sampled by solid angle [sr]. One sample alone has to stay below what a hemisphere
    of the lamp's radiance would give; many are spread better over the area, until only what is nearest counts. */
 static const float large_for_one = 0.01f, large_for_many = 2.5f;
@@ -15,18 +17,16 @@ static bool is_cut(const light_face *face, vec3 point, vec3 normal) {
     return false;
 }
 
-/* Sutherland-Hodgman against the horizon. */
-static int clip_face(const light_face *face, vec3 point, vec3 normal, vec3 out_corners[5]) {
-    int clipped = 0;
-    for (int i = 0; i < face->count; ++i) {
-        const vec3 a = face->corners[i], b = face->corners[(i + 1) % face->count];
-        const float height_a = vec3_dot(vec3_sub(a, point), normal), height_b = vec3_dot(vec3_sub(b, point), normal);
-        if (height_a > 0)
-            out_corners[clipped++] = a;
-        if ((height_a > 0) != (height_b > 0))
-            out_corners[clipped++] = vec3_mul_add(vec3_sub(b, a), height_a / (height_a - height_b), a);
-    }
-    return clipped;
+/* The corners of what of a face is above the horizon, and how many these are. */
+static int clip_face(const light_face *face, vec3 point, vec3 normal, vec3 out_corners[MAX_CLIPPED]) {
+    const dvec3 n = {(double)normal.x, (double)normal.y, (double)normal.z};
+    dvec3 seen[MAX_CORNERS], clipped[MAX_CLIPPED];
+    for (int i = 0; i < face->count; ++i)
+        seen[i] = dvec3_between(point, face->corners[i]);
+    const int count = clip_to_horizon(seen, face->count, n, clipped);
+    for (int i = 0; i < count; ++i)
+        out_corners[i] = vec3_add(point, (vec3){(float)clipped[i].x, (float)clipped[i].y, (float)clipped[i].z});
+    return count;
 }
 
 /* Of the triangle between three unit directions (Van Oosterom & Strackee 1983, eq. 8) [sr]. */
@@ -36,7 +36,7 @@ static float solid_angle(const vec3 seen[3]) {
 }
 
 static void add_risen(const light_face *face, aimed_light *io_aimed) {
-    vec3 corners[5];
+    vec3 corners[MAX_CLIPPED];
     const int count = clip_face(face, io_aimed->point, io_aimed->normal, corners);
     for (int i = 2; i < count; ++i) {
         const vec3 a = corners[0], b = corners[i - 1], c = corners[i], point = io_aimed->point;

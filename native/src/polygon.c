@@ -4,10 +4,8 @@
  */
 #include "polygon.h"
 
-enum { MAX_CORNERS = 4, MAX_CLIPPED = MAX_CORNERS + 1 };
-
 /* Sutherland-Hodgman against the one plane of the horizon. */
-static int clip_to_horizon(const dvec3 *corners, int count, dvec3 normal, dvec3 *out_clipped) {
+int clip_to_horizon(const dvec3 *corners, int count, dvec3 normal, dvec3 *out_clipped) {
     int clipped = 0;
     for (int i = 0; i < count; ++i) {
         const dvec3 a = corners[i], b = corners[(i + 1) % count];

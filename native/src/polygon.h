@@ -4,6 +4,11 @@
 
 #include "vec3.h"
 
+enum { MAX_CORNERS = 4, MAX_CLIPPED = MAX_CORNERS + 1 };
+
+/* What of a polygon is above the horizon of the origin; how many corners that has. */
+int clip_to_horizon(const dvec3 *corners, int count, dvec3 normal, dvec3 *out_clipped);
+
 /*
  * Form factor from a point with a normal to a polygon of 3 or 4 corners, unoccluded, whichever way the
  * polygon faces: what lies below the horizon is clipped away.
