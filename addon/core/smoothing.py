@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .charts import Charts
+from .emitters import LUMINANCE
 from .kernel import smooth
 from .receivers import Receivers
 from .relative import scale_of
@@ -21,6 +22,8 @@ from .workers import Workers
 
 LARGEST_VARIANCE = 1e34  # whatever shines: the sum of some remains a float32
 STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
+KEPT = 16  # texels to every side of each, over which smoothing is made to keep the light,
+MOST_KEPT = 0.5  # of what it left more or less, at the most
 POOL = 5  # receivers in a row that are neighbours, where there is no grid
 
 
@@ -84,6 +87,38 @@ def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, va
     scales = scale_of(near)
     relative = pooled(workers, grid, receivers, variances / scales**2 * taken) / taken
     noise = np.minimum(relative * scales**2, LARGEST_VARIANCE).astype(np.float32)
+    smooth_values, left = values, noise
     for step in STEPS:
-        values, noise = smooth(workers, grid, receivers, values, noise, step, True)
-    return values, noise
+        smooth_values, left = smooth(workers, grid, receivers, smooth_values, left, step, True)
+    return kept(grid, values, smooth_values, np.sqrt(noise)), left
+
+
+def kept(grid: TexelGrid, values, smooth_values, deviations):
+    """Smoothed light (N, 3), scaled so that around every texel there is as much of it as there was in ``values``.
+
+    Most rays see less than the mean and few see much more. Smoothing that minds values takes these few for something
+    else, and the light for less than it is, by the more the noisier it was: ``deviations`` (N,) say where to put it.
+    What noise is common to both falls out of their difference.
+    """
+    luminance = smooth_values @ LUMINANCE
+    lost, noise = _around(grid, values @ LUMINANCE - luminance), _around(grid, deviations)
+    given = deviations * lost / np.where(noise > 0, noise, 1)
+    # what is dimmer than rounding beside what is bright has no share that means something
+    ratios = 1 + np.clip(given / np.where(luminance > 0, luminance, np.inf), -MOST_KEPT, MOST_KEPT)
+    return (ratios[:, None] * smooth_values).astype(np.float32)
+
+
+def _around(grid: TexelGrid, luminance):
+    """Sums (N,) of luminance (N,) over the square of texels around each receiver, KEPT to every side."""
+    is_set = grid.receivers >= 0
+    order = grid.receivers[is_set]
+    image = np.zeros(is_set.shape)
+    image[is_set] = luminance[order]
+    for axis in (0, 1):
+        until = np.insert(np.cumsum(image, axis), 0, 0.0, axis)
+        at = np.arange(image.shape[axis])
+        first, last = np.maximum(at - KEPT, 0), np.minimum(at + KEPT + 1, len(at))
+        image = until.take(last, axis) - until.take(first, axis)
+    sums = np.zeros(len(luminance))
+    sums[order] = image[is_set]
+    return sums
