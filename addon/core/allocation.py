@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-GROWTH = 3  # times the rays that a receiver has, that a pass adds at the most: what is known by then is not known well
+GROWTH = 4  # times the rays that a receiver has, that a pass adds at the most: what is known by then is not known well
 WORTH = 1.25  # times the rays it has, that a receiver must be due to go on
 LEAST_NOISE = 1e-6  # where replicates agree by chance, or because all of them missed the light
 BINS = 16  # of measured receivers, by their stated noise
@@ -54,10 +54,12 @@ def next_pass(due, taken, most, cost, rays_left):
     taken, most : (N,) rays that receivers have, and that one may have
     cost : rays traced for one of all replicates
     """
-    due = np.minimum(np.minimum(due, most), (1 + GROWTH) * taken)
+    allowed = np.maximum(np.minimum(most - taken, GROWTH * taken), 0)
+    highest = np.floor(np.log2(np.maximum(allowed, 1)))
+    due = np.minimum(due, taken + allowed)
     while True:
         wanted = np.maximum(due - taken, 0)
-        further = 2 ** np.floor(np.log2(np.maximum(wanted, 1))).astype(np.int64)
+        further = 2 ** np.minimum(np.round(np.log2(np.maximum(wanted, 1))), highest).astype(np.int64)
         active = np.flatnonzero(wanted >= np.maximum((WORTH - 1) * taken, 1))
         if cost * further[active].sum() <= rays_left or not len(active):
             return active, further

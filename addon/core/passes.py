@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .allocation import measured_errors, next_pass, rays_due
+from .allocation import GROWTH, measured_errors, next_pass, rays_due
 from .denoising import denoised
 from .gather_job import REPLICATES, GatherJob, variance_of
 from .measuring import probes_among
@@ -26,11 +26,12 @@ FREE_RAYS = 1 << 26
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
-AIM = 0.95  # of the target: what receivers are due is an estimate
+AIM, DENOISED_AIM = 0.95, 1.05  # of the target: what receivers are due is an estimate, and a denoiser takes off some;
+STEP = 0.85  # of the error there is, or less: receivers that are due hardly more would get nothing
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
-SPECKLE = 2.0  # times the target: what is left, when it is met, is seen
-MOST_EXTRA = 1  # pass after that, with four times the rays and no more than
-SPECKLE_SHARE = 1 / 8  # of those traced: most speckles are gone by then
+SPECKLE = 2.0  # times the target: what is left, when it is met, is seen; four times the rays for that, but no more than
+SPECKLE_SHARE = 1 / 8  # of those traced, once: with the pass that is likely the last,
+LAST = 1.5  # times the target or nearer, or else in one more
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 
 
@@ -117,7 +118,8 @@ def gather_until(
     # in a hurry as few as may be: whoever is not done gets more
     first = first_rays(fewest, error) if seconds_left() == np.inf else fewest
     active, further = np.arange(count), np.full(count, first)
-    budget, idle, extra, begin, rms = 0, 0, 0, 0.0, np.inf
+    aim = AIM if denoise is None or grid is None else DENOISED_AIM
+    budget, idle, is_cleared, begin, rms = 0, 0, False, 0.0, np.inf
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
@@ -135,16 +137,15 @@ def gather_until(
         found = _best_estimate(job, grid, means, near, samples.taken, direct, probes)
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
-            found = _denoised(denoise, grid, found, means, direct, probes)
+            found, aim = _denoised(denoise, grid, found, means, direct, probes), AIM
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
-        extra += rms <= error
         in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
-        active, further, stopped = _next(found, samples, probes, error, budget - samples.rays, in_time)
+        due, clears = _due(found, samples, probes, error, aim * error, is_cleared)
+        active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
+        is_cleared |= clears
         if idle == MOST_IDLE:
             stopped = "as further rays no longer help"
-        elif extra > MOST_EXTRA:
-            stopped = ""
         if stopped is not None:
             found = found if is_asked else _denoised(denoise, grid, found, means, direct, probes)
             traced = samples.rays, probes.measured.rays
@@ -188,18 +189,30 @@ def _denoised(denoise, grid, found: _Found, means, direct, probes: Probes) -> _F
     return min(found, other, key=lambda estimate: estimate.rms)
 
 
-def _next(found: _Found, samples: _Samples, probes: Probes, error, rays_left, rays_in_time):
-    """The receivers of the next pass (K,), further rays of each (N,), and what stops it, None where nothing does."""
-    if found.rms > error:
+def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, is_cleared):
+    """Rays of a replicate that each receiver is due (N,), and whether speckles are among them: once they are cleared.
+
+    A speckle is a receiver whose noise would be seen when the target is met.
+    """
+    is_met = found.rms <= error
+    due = np.zeros(len(samples.taken))
+    if not is_met:
         errors = measured_errors(found.noise, probes.receivers, found.squares)
-        due = rays_due(errors, samples.taken, AIM * error)
-    else:
-        due = np.where(found.noise > SPECKLE * error, np.inf, 0.0)
+        due = rays_due(errors, samples.taken, min(aim, STEP * found.rms))
+    is_speckle = found.noise > SPECKLE * error
+    cost = GROWTH * samples.cost * samples.taken[is_speckle].sum()
+    clears = not is_cleared and (is_met or (found.rms <= LAST * error and cost <= SPECKLE_SHARE * samples.rays))
+    return np.where(clears & is_speckle, np.inf, due), clears
+
+
+def _next(due, samples: _Samples, is_met, rays_left, rays_in_time):
+    """The receivers of the next pass (K,), further rays of each (N,), and what stops it, None where nothing does."""
+    if is_met:
         rays_left = min(rays_left, SPECKLE_SHARE * samples.rays)
     wanting, _ = next_pass(due, samples.taken, MOST_RAYS, samples.cost, np.inf)
     active, further = next_pass(due, samples.taken, MOST_RAYS, samples.cost, min(rays_left, rays_in_time))
     if len(wanting) and len(active) >= ENOUGH * len(wanting):
         return active, further, None
-    if not len(wanting) or found.rms <= error:
+    if not len(wanting) or is_met:
         return active, further, ""
     return active, further, "by the time limit" if rays_in_time < rays_left else "by the budget of rays"

@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 
+from addon.core.allocation import GROWTH
 from addon.core.gather_job import REPLICATES
 from addon.core.passes import (
     ENOUGH,
     FREE_RAYS,
+    LAST,
     LEAST_FIRST,
     MOST_FIRST,
     SPECKLE_SHARE,
+    _due,
     _Found,
     _next,
     _Samples,
@@ -44,27 +47,52 @@ def after_a_pass(noise, error_found):
     return _Found(np.zeros((COUNT, 3)), noise, squares), samples, Probes(chosen, np.ones(len(chosen)), measured)
 
 
+def next_of(noise, error_found, error, rays_left=1e12, rays_in_time=np.inf, is_cleared=False):
+    """What comes after it: samples so far, receivers, further rays, what stops it, whether it clears speckles."""
+    found, samples, probes = after_a_pass(noise, error_found)
+    due, clears = _due(found, samples, probes, error, error, is_cleared)
+    return samples, *_next(due, samples, error_found <= error, rays_left, rays_in_time), clears
+
+
+SPECKLED = np.where(np.arange(COUNT) % 32 == 0, 0.5, 0.001)
+
+
 def test_a_target_that_is_met_leaves_speckles_an_eighth_of_the_rays_at_the_most():
-    noise = np.where(np.arange(COUNT) % 32 == 0, 0.5, 0.001)
-    found, samples, probes = after_a_pass(noise, 0.01)
-    active, further, stopped = _next(found, samples, probes, 0.02, 1e12, np.inf)
+    samples, active, further, stopped, clears = next_of(SPECKLED, 0.01, 0.02)
     assert stopped is None
-    assert set(active) <= set(np.flatnonzero(noise > 0.1))
+    assert clears
+    assert set(active) <= set(np.flatnonzero(SPECKLED > 0.1))
     assert 0 < samples.cost * further[active].sum() <= SPECKLE_SHARE * samples.rays
+
+
+def test_speckles_are_cleared_once():
+    _, active, _, stopped, clears = next_of(SPECKLED, 0.01, 0.02, is_cleared=True)
+    assert len(active) == 0
+    assert stopped == ""
+    assert not clears
+
+
+def test_the_pass_that_is_likely_the_last_clears_speckles_too_where_they_are_few():
+    few, many = np.arange(COUNT) % 64 == 0, np.arange(COUNT) % 8 == 0
+    for speckles, near, expected in ((few, LAST, True), (few, 1.1 * LAST, False), (many, LAST, False)):
+        # as measured, what is noisy is not wrong: only as speckles do they get rays
+        noise = np.where(speckles, 0.5, 0.02)
+        _, _, further, _, clears = next_of(noise, 0.02 * near, 0.02)
+        assert clears == expected
+        assert (further[speckles] == GROWTH * 8).all() == expected
 
 
 def test_a_target_that_is_met_is_stopped_by_nothing():
     for noise, rays_left in ((np.full(COUNT, 0.001), 1e12), (np.full(COUNT, 0.5), 0)):
-        found, samples, probes = after_a_pass(noise, 0.01)
-        assert _next(found, samples, probes, 0.02, rays_left, np.inf)[2] == ""
+        assert next_of(noise, 0.01, 0.02, rays_left)[3] == ""
 
 
 def test_a_target_that_is_missed_names_what_ran_out():
-    found, samples, probes = after_a_pass(np.full(COUNT, 0.2), 0.2)
-    few = ENOUGH * samples.cost
-    assert _next(found, samples, probes, 0.02, few, np.inf)[2] == "by the budget of rays"
-    assert _next(found, samples, probes, 0.02, 1e12, few)[2] == "by the time limit"
-    active, further, stopped = _next(found, samples, probes, 0.02, 1e12, np.inf)
+    noise = np.full(COUNT, 0.2)
+    few = ENOUGH * REPLICATES
+    assert next_of(noise, 0.2, 0.02, few)[3] == "by the budget of rays"
+    assert next_of(noise, 0.2, 0.02, 1e12, few)[3] == "by the time limit"
+    _, active, further, stopped, _ = next_of(noise, 0.2, 0.02)
     assert stopped is None
     assert len(active) == COUNT
     assert (further[active] >= 8).all()
