@@ -31,7 +31,8 @@ STEP = 0.85  # of the error there is, or less: receivers that are due hardly mor
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
 SPECKLE = 2.0  # times the target: what is left, when it is met, is seen; four times the rays for that, but no more than
 SPECKLE_SHARE = 1 / 8  # of those traced, once: with the pass that is likely the last,
-LAST = 1.5  # times the target or nearer, or else in one more
+LAST = 1.5  # times the target or nearer, or else in one more,
+LEAST_SPECKLES = 1 / 1024  # of the receivers, where there are so many
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 
 
@@ -201,7 +202,8 @@ def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, is_cleare
         due = rays_due(errors, samples.taken, min(aim, STEP * found.rms))
     is_speckle = found.noise > SPECKLE * error
     cost = GROWTH * samples.cost * samples.taken[is_speckle].sum()
-    clears = not is_cleared and (is_met or (found.rms <= LAST * error and cost <= SPECKLE_SHARE * samples.rays))
+    is_time = found.rms <= LAST * error and cost <= SPECKLE_SHARE * samples.rays
+    clears = not is_cleared and (is_speckle.mean() >= LEAST_SPECKLES if is_met else is_time)
     return np.where(clears & is_speckle, np.inf, due), clears
 
 

@@ -10,6 +10,7 @@ from addon.core.passes import (
     FREE_RAYS,
     LAST,
     LEAST_FIRST,
+    LEAST_SPECKLES,
     MOST_FIRST,
     SPECKLE_SHARE,
     _due,
@@ -70,6 +71,12 @@ def test_speckles_are_cleared_once():
     assert len(active) == 0
     assert stopped == ""
     assert not clears
+
+
+def test_few_speckles_are_not_worth_a_pass():
+    noise = np.full(COUNT, 0.001)
+    noise[: int(LEAST_SPECKLES * COUNT) - 1] = 0.5
+    assert next_of(noise, 0.01, 0.02)[3] == ""
 
 
 def test_the_pass_that_is_likely_the_last_clears_speckles_too_where_they_are_few():
