@@ -83,19 +83,19 @@ def gather_irradiance(
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
     weights = grid.shown if grid else np.ones(len(receivers), np.float32)
     job = GatherJob(kernel, solved, receivers, weights, no_guides(len(receivers)))
-    direct, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.4))
+    direct, shadow_rays, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.4))
     if grid is not None:
-        job = _with_texel_light(job, grid, direct.values, look)
+        job = _with_texel_light(job, grid, direct, look)
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     gathered = gather_until(
-        replace(job, guides=guides), grid, direct.values, denoise, error, seed, seconds_left, within(on_step, 0.4, 0.6)
+        replace(job, guides=guides), grid, direct, denoise, error, seed, seconds_left, within(on_step, 0.4, 0.6)
     )
     at_points = measure(gathered.job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
     # relative to what is there, not to what is shown: light that leaks into the dark has to count as all wrong
     scale = scale_of_luminance(at_points.luminance)
     seen_error = rms_of(at_points.squares_of(seen.look_up(gathered.values), scale))
     traced = {
-        "direct": direct.rays,
+        "direct": shadow_rays,
         "gather": looks + learning + gathered.rays,
         "probe": gathered.probe_rays + at_points.rays,
     }
@@ -104,7 +104,7 @@ def gather_irradiance(
 
 
 def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
-    """Direct light, what a few gather rays find (N, 3), and how many these were.
+    """Direct light (N, 3) and its rays, what a few gather rays find (N, 3) and how many these were.
 
     Direct light comes in two parts, as how much noise it may have depends on what else there is.
     """
@@ -116,12 +116,13 @@ def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
         return pooled(job.kernel.workers, grid, job.receivers, of_one_ray)
 
     first = first_direct(trace, error, seed, within(on_step, 0.0, 0.25))
-    means, _, rays = job.gathered(LOOK_RAYS, seed + 2, within(on_step, 0.25, 0.25))
-    look = means.mean(axis=1) if grid is None else blurred(job.kernel.workers, grid, job.receivers, means)
+    look, _, rays = job.gathered(LOOK_RAYS, seed + 2, within(on_step, 0.25, 0.25))
+    if grid is not None:
+        look = blurred(job.kernel.workers, grid, job.receivers, look)
     scale = scale_of(first.values + look)
     rest = within(on_step, 0.5, 0.5)
     direct = refined_direct(first, trace, over_neighbours, scale, job.weights, error, seed, rest)
-    return direct, look, rays
+    return direct.values, direct.rays, look, rays
 
 
 def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look) -> GatherJob:

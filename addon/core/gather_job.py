@@ -14,6 +14,7 @@ from .receivers import Receivers
 from .smoothing import TexelGrid
 from .texel_light import NO_TEXEL_LIGHT, TexelLight
 
+BLOCK = 1 << 16  # receivers whose replicates are taken apart at once: all would take more memory than all else does
 REPLICATES = 4  # independent randomisations; their spread is the error estimate
 
 
@@ -74,13 +75,21 @@ class GatherJob:
         )
 
     def gathered(self, count, seed, on_step=None):
-        """Means of ``count`` rays of each replicate (N, R, 3), the variance of their mean (N,), the rays traced."""
+        """Light by ``count`` rays of each replicate (N, 3), the variance of its luminance (N,), the rays traced."""
         sums = np.zeros((len(self.receivers), REPLICATES, 3), np.float32)
         rays = self.gather(np.arange(len(sums)), 0, count, seed, sums, on_step)
-        means = sums / count
-        return means, variance_of(means), rays
+        return *estimate_of(sums, np.full(len(sums), count)), rays
 
 
-def variance_of(means):
-    """Variance (N,) of the luminance of the mean of replicates' means (N, R, 3), by their spread."""
-    return (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]
+def estimate_of(sums, taken):
+    """What replicates' sums (N, R, 3) of so many rays each (N,) come to: their mean, and what it is uncertain by.
+
+    Values float32 (N, 3), and the variance float64 (N,) of their luminance, by the replicates' spread.
+    """
+    values, variance = np.empty((len(sums), 3), np.float32), np.empty(len(sums))
+    for first in range(0, len(sums), BLOCK):
+        block = slice(first, first + BLOCK)
+        means = sums[block] / taken[block, None, None].astype(np.float32)
+        values[block] = means.mean(axis=1)
+        variance[block] = (means @ LUMINANCE).var(axis=1, ddof=1) / means.shape[1]
+    return values, variance

@@ -35,12 +35,12 @@ def measure(job: GatherJob, error, seed) -> Measured:
     direct, variance, rays = job.direct(4 * shadow_samples(error), seed)
     values, noise, count = direct.copy(), variance.copy(), rays_for(error)
     pilot, spread, traced = job.gathered(max(count // PILOT, 1), seed)
-    quiet = np.sqrt(spread / PILOT) <= error * scale_of(direct + pilot.mean(axis=1))
+    quiet = np.sqrt(spread / PILOT) <= error * scale_of(direct + pilot)
     rays += traced
     more = max(min(MORE_RAYS * count, MOST_RAYS), 2 * count)
     for part, share, own in ((quiet, count, seed + 1), (~quiet, more, seed + 2)):
         gathered, spread, traced = job.part(np.flatnonzero(part)).gathered(share, own)
-        values[part] += gathered.mean(axis=1)
+        values[part] += gathered
         noise[part] += spread
         rays += traced
     return Measured(values @ LUMINANCE, noise, rays)

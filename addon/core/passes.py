@@ -10,7 +10,7 @@ import numpy as np
 
 from .allocation import GROWTH, measured_errors, next_pass, rays_due
 from .denoising import denoised
-from .gather_job import REPLICATES, GatherJob, variance_of
+from .gather_job import REPLICATES, GatherJob, estimate_of
 from .measuring import probes_among
 from .probes import Probes, rms_of
 from .relative import scale_of
@@ -76,11 +76,6 @@ class _Samples:
         self.taken[active] += further[active]
 
     @property
-    def means(self):
-        """Of the replicates, (N, R, 3)."""
-        return self.sums / self.taken[:, None, None].astype(np.float32)
-
-    @property
     def cost(self) -> float:
         """Rays traced for one of all replicates: with those that it goes on as."""
         return self.rays / int(self.taken.sum())
@@ -126,19 +121,20 @@ def gather_until(
         width = 0.5 * (1 - begin)
         samples.add(job, active, further, seed, within(on_step, begin, width))
         begin += width
+        del active, further
         budget = budget or ray_budget(samples.rays * fewest / first, error)
-        means = samples.means
+        gathered, variance = estimate_of(samples.sums, samples.taken)
         near = None
         if grid:
             # blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while
             # smoothing that minds values would take some of a few rays' light away
-            near = blurred(job.kernel.workers, grid, job.receivers, means)
+            near = blurred(job.kernel.workers, grid, job.receivers, gathered)
             job = job.seeing(grid, direct, near)
         probes = probes or probes_among(job, error, seed + 1)
-        found = _best_estimate(job, grid, means, near, samples.taken, direct, probes)
+        found = _best_estimate(job, grid, gathered, variance, near, samples.taken, direct, probes)
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
-            found, aim = _denoised(denoise, grid, found, means, direct, probes), AIM
+            found, aim = _denoised(denoise, grid, found, gathered, direct, probes), AIM
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
         in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
@@ -148,7 +144,7 @@ def gather_until(
         if idle == MOST_IDLE:
             stopped = "as further rays no longer help"
         if stopped is not None:
-            found = found if is_asked else _denoised(denoise, grid, found, means, direct, probes)
+            found = found if is_asked else _denoised(denoise, grid, found, gathered, direct, probes)
             traced = samples.rays, probes.measured.rays
             return Gathered(job, found.values, found.rms, stopped, found.is_denoised, *traced)
 
@@ -163,28 +159,29 @@ def ray_budget(fewest_cost, error) -> int:
     return int(max(MOST_COST * fewest_cost, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
 
 
-def _best_estimate(job: GatherJob, grid, means, near, taken, direct, probes: Probes) -> _Found:
-    """What replicate means (N, R, 3) come to; ``near`` is the means blurred.
+def _best_estimate(job: GatherJob, grid, values, variance, near, taken, direct, probes: Probes) -> _Found:
+    """What gathered light (N, 3) of a variance (N,) comes to; ``near`` is the same blurred.
 
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
     """
     workers, receivers = job.kernel.workers, job.receivers
-    values, variance = means.mean(axis=1), variance_of(means)
-    estimates = [(values, pooled(workers, None, receivers, variance * taken) / taken)]
-    if grid is not None:
-        estimates.append(smoothed(workers, grid, receivers, values, variance, near, taken))
-    found = []
-    for gathered, noise in estimates:
+
+    def found_by(gathered, noise):
         lit = (direct + gathered).astype(np.float32)
-        found.append(_Found(lit, np.sqrt(job.weights * noise) / scale_of(lit), probes.squares_of(lit)))
-    return min(found, key=lambda estimate: estimate.rms)
+        relative = (np.sqrt(job.weights * noise) / scale_of(lit)).astype(np.float32)
+        return _Found(lit, relative, probes.squares_of(lit))
+
+    as_it_is = found_by(values, pooled(workers, None, receivers, variance * taken) / taken)
+    if grid is None:
+        return as_it_is
+    other = found_by(*smoothed(workers, grid, receivers, values, variance, near, taken))
+    return min(as_it_is, other, key=lambda estimate: estimate.rms)
 
 
-def _denoised(denoise, grid, found: _Found, means, direct, probes: Probes) -> _Found:
+def _denoised(denoise, grid, found: _Found, gathered, direct, probes: Probes) -> _Found:
     """What the denoiser makes of it, where there is one and the probes find it better."""
     if denoise is None or grid is None:
         return found
-    gathered = means.mean(axis=1, dtype=np.float32)
     values = denoised(denoise, grid, found.values, direct, gathered, probes.receivers, probes.measured)
     other = replace(found, values=values, squares=probes.squares_of(values), is_denoised=True)
     return min(found, other, key=lambda estimate: estimate.rms)

@@ -9,6 +9,7 @@ import numpy as np
 from .kernel import KernelScene
 from .scene import Scene
 
+BLOCK = 1 << 16  # receivers that are placed at once: with all corners of all they would take ten times their memory
 EDGE_INSET = 1e-3  # of a triangle: receivers keep so far off its edges
 INSET = 1 / 12  # of a triangle: a vertex is where surfaces touch, so its receivers stand a little inside their faces
 
@@ -42,19 +43,28 @@ class Receivers:
 
 def surface_receivers(scene: Scene, triangles, barycentrics) -> Receivers:
     """Receivers on the fronts of triangles (N,) at barycentrics (N, 3)."""
+    count, corners = len(triangles), scene.corners
+    positions, normals = np.empty((count, 3)), np.empty((count, 3), np.float32)
+    for first in range(0, count, BLOCK):
+        block = slice(first, first + BLOCK)
+        chosen = triangles[block]
+        placed = _placed(barycentrics[block], corners[chosen], scene.corner_normals[chosen].astype(np.float64))
+        positions[block], normals[block] = placed
+    return Receivers(positions, normals, (2 * triangles).astype(np.int32))
+
+
+def _placed(barycentrics, corners, corner_normals):
+    """Positions and normals (N, 3) at barycentrics (N, 3) of corners and their normals (N, 3, 3)."""
     # exactly on an edge a ray can slip between the face and the wall that stands on it
     weights = np.maximum(barycentrics.astype(np.float64), EDGE_INSET)
     weights /= weights.sum(axis=1, keepdims=True)
-    corners = scene.corners[triangles]
-    corner_normals = scene.corner_normals[triangles].astype(np.float64)
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
     positions = np.einsum("nk,nkc->nc", weights, corners)
     normals = np.einsum("nk,nkc->nc", weights, corner_normals)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals = np.where(lengths > 1e-6, normals / np.maximum(lengths, 1e-6), flat)
-    positions += _lift(positions, corners, corner_normals, weights, flat)[:, None] * flat
-    return Receivers(positions, normals.astype(np.float32), (2 * triangles).astype(np.int32))
+    return positions + _lift(positions, corners, corner_normals, weights, flat)[:, None] * flat, normals
 
 
 def _lift(positions, corners, corner_normals, weights, flat):

@@ -24,6 +24,7 @@ LARGEST_VARIANCE = 1e34  # whatever shines: the sum of some remains a float32
 STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
 KEPT = 16  # texels to every side of each, over which smoothing is made to keep the light,
 MOST_KEPT = 0.5  # of what it left more or less, at the most
+BAND = 256  # rows of the grid at once
 POOL = 5  # receivers in a row that are neighbours, where there is no grid
 
 
@@ -51,18 +52,22 @@ def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Rec
     """The grid that a lightmap's receivers lie in."""
     grid = np.full((texel_map.height, texel_map.width), -1, np.int32)
     grid[texel_map.rows, texel_map.columns] = np.arange(len(texel_map))
-    beside = (grid[:, :-1] >= 0) & (grid[:, 1:] >= 0)
-    left, right = receivers.positions[grid[:, :-1][beside]], receivers.positions[grid[:, 1:][beside]]
-    apart = np.linalg.norm(right - left, axis=1)
-    apart = apart[apart > 0]
+    apart = np.concatenate([_apart(grid[row : row + BAND], receivers.positions) for row in range(0, len(grid), BAND)])
     spacing = float(np.median(apart)) if len(apart) else 1.0
     colours = textured_colours(scene, texel_map.triangles, texel_map.barycentrics, "reflectance", "reflectance_texture")
     return TexelGrid(grid, spacing, charts.uvs, np.clip(colours, 0, 1), texel_map.shown)
 
 
-def blurred(workers: Workers, grid: TexelGrid, receivers: Receivers, means):
-    """Replicate means (N, R, 3) of gathered light over the nearest texels of the same surface: float32 (N, 3)."""
-    values = means.mean(axis=1, dtype=np.float32)
+def _apart(rows, positions):
+    """Distances of receivers that lie side by side in rows of the grid, but for those at one place."""
+    beside = (rows[:, :-1] >= 0) & (rows[:, 1:] >= 0)
+    left, right = positions[rows[:, :-1][beside]], positions[rows[:, 1:][beside]]
+    apart = np.linalg.norm(right - left, axis=1).astype(np.float32)
+    return apart[apart > 0]
+
+
+def blurred(workers: Workers, grid: TexelGrid, receivers: Receivers, values):
+    """Gathered light float32 (N, 3), averaged over the nearest texels of the same surface: float32 (N, 3)."""
     return smooth(workers, grid, receivers, values, np.zeros(len(values), np.float32), 1, False)[0]
 
 
@@ -87,6 +92,7 @@ def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, va
     scales = scale_of(near)
     relative = pooled(workers, grid, receivers, variances / scales**2 * taken) / taken
     noise = np.minimum(relative * scales**2, LARGEST_VARIANCE).astype(np.float32)
+    del variances, scales, relative
     smooth_values, left = values, noise
     for step in STEPS:
         smooth_values, left = smooth(workers, grid, receivers, smooth_values, left, step, True)
@@ -100,16 +106,17 @@ def kept(grid: TexelGrid, values, smooth_values, deviations):
     else, and the light for less than it is, by the more the noisier it was: ``deviations`` (N,) say where to put it.
     What noise is common to both falls out of their difference.
     """
-    luminance = smooth_values @ LUMINANCE
-    lost, noise = _around(grid, values @ LUMINANCE - luminance), _around(grid, deviations)
-    given = deviations * lost / np.where(noise > 0, noise, 1)
+    luminance = (smooth_values @ LUMINANCE).astype(np.float32)
+    given = deviations * _around(grid, values @ LUMINANCE - luminance)
+    noise = _around(grid, deviations)
+    given /= np.where(noise > 0, noise, 1)
+    given /= np.where(luminance > 0, luminance, np.inf)
     # what is dimmer than rounding beside what is bright has no share that means something
-    ratios = 1 + np.clip(given / np.where(luminance > 0, luminance, np.inf), -MOST_KEPT, MOST_KEPT)
-    return (ratios[:, None] * smooth_values).astype(np.float32)
+    return (1 + np.clip(given, -MOST_KEPT, MOST_KEPT))[:, None] * smooth_values
 
 
 def _around(grid: TexelGrid, luminance):
-    """Sums (N,) of luminance (N,) over the square of texels around each receiver, KEPT to every side."""
+    """Sums float32 (N,) of luminance (N,) over the square of texels around each receiver, KEPT to every side."""
     is_set = grid.receivers >= 0
     order = grid.receivers[is_set]
     image = np.zeros(is_set.shape)
@@ -118,7 +125,8 @@ def _around(grid: TexelGrid, luminance):
         until = np.insert(np.cumsum(image, axis), 0, 0.0, axis)
         at = np.arange(image.shape[axis])
         first, last = np.maximum(at - KEPT, 0), np.minimum(at + KEPT + 1, len(at))
-        image = until.take(last, axis) - until.take(first, axis)
-    sums = np.zeros(len(luminance))
+        image = until.take(last, axis)
+        image -= until.take(first, axis)
+    sums = np.zeros(len(luminance), np.float32)
     sums[order] = image[is_set]
     return sums

@@ -6,6 +6,8 @@ import numpy as np
 
 from .scene import Scene, Texture
 
+BLOCK = 1 << 16  # points that are looked up at once
+
 
 def lookup(texture: Texture, uvs):
     """Bilinear, repeating lookup at uvs (N, 2): float32 (N, 3). Row 0 of the pixels is at v = 0."""
@@ -34,6 +36,7 @@ def textured_colours(scene: Scene, triangles, barycentrics, factor: str, texture
         if image is None:
             continue
         at = np.flatnonzero(materials == index)
-        uvs = np.einsum("nk,nkc->nc", barycentrics[at], scene.uvs[triangles[at]])
-        colours[at] *= lookup(image, uvs)
+        for part in np.array_split(at, len(at) // BLOCK + 1):
+            uvs = np.einsum("nk,nkc->nc", barycentrics[part], scene.uvs[triangles[part]])
+            colours[part] *= lookup(image, uvs)
     return colours

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.gather_job import variance_of
+from addon.core.gather_job import estimate_of
 from addon.core.kernel import smooth
 from addon.core.receivers import Receivers
 from addon.core.smoothing import TexelGrid, blurred, kept, smoothed
@@ -35,9 +35,10 @@ def noisy(light, deviation, seed=1):
 
 def run(grid, receivers, means, taken=1):
     with Workers(2) as workers:
-        near = blurred(workers, grid, receivers, means)
+        values, variances = estimate_of(means, np.ones(len(means)))
+        near = blurred(workers, grid, receivers, values)
         taken = np.broadcast_to(taken, len(means))
-        return smoothed(workers, grid, receivers, means.mean(axis=1), variance_of(means), near, taken)
+        return smoothed(workers, grid, receivers, values, variances, near, taken)
 
 
 @pytest.mark.parametrize("step", [1, 4])
@@ -66,7 +67,7 @@ def test_a_blur_keeps_the_light_that_few_rays_found():
     # one ray in ten finds a lamp: what smoothing takes for noise is all the light there is
     found = 10.0 * (np.random.default_rng(4).random((SIDE * SIDE, 4, 1)) < 0.1) * np.ones(3)
     with Workers(2) as workers:
-        light = blurred(workers, grid, receivers, found.astype(np.float32))
+        light = blurred(workers, grid, receivers, found.mean(axis=1).astype(np.float32))
     # the means of neighbours have the mean of all; only at borders do some count for more
     assert light.mean() == pytest.approx(found.mean(), rel=0.01)
     assert light.std() < 0.5 * found.mean(axis=1).std()
