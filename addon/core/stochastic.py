@@ -16,6 +16,7 @@ from .solver import Solution
 
 FULL = 1 << 62  # what all flux of one step comes to, in fixed point
 REPLICATES = 2  # independent runs that share the rays: every step costs as many passes over all sides
+BLOCK = 1 << 16  # sides that are worked on at once where all would need more copies of their flux
 LEAST_RAYS = 1024  # of a step
 LEAST_STEPS = 4  # before the reflectance of the whole is known well enough to choose how to go on
 REGULAR_COST = 40  # first steps' rays: where incremental shooting would take more, regular iterations go on
@@ -83,13 +84,14 @@ def solve_stochastic(
 
 def _mean_and_error(fluxes, areas):
     """Radiosity (N, 3), and its standard error, which one run alone does not have."""
-    mean = sum(fluxes[1:], fluxes[0].copy())
-    mean /= len(fluxes)
     if len(fluxes) == 1:
-        return mean / areas, None
-    squares = sum((flux - mean) ** 2 for flux in fluxes)
-    mean /= areas
-    return mean, np.sqrt(squares / (len(fluxes) * (len(fluxes) - 1))) / areas
+        return fluxes[0] / areas, None
+    mean, error = np.empty_like(fluxes[0]), np.empty_like(fluxes[0])
+    for first in range(0, len(mean), BLOCK):
+        block = slice(first, first + BLOCK)
+        runs = np.stack([flux[block] for flux in fluxes]) / areas[block]
+        mean[block], error[block] = runs.mean(axis=0), runs.std(axis=0, ddof=1) / len(runs) ** 0.5
+    return mean, error
 
 
 def _mean_residuals(runs):
@@ -121,8 +123,10 @@ class _Shooting:
         self._samples[shooting] += np.diff(first_rays).astype(np.uint32)
         self.rays += int(first_rays[-1])
         landed = np.flatnonzero(received.any(axis=1))
-        reflected = received[landed] / scale
-        reflected *= self.reflectance[landed]
+        reflected = np.empty((len(landed), 3))
+        for first in range(0, len(landed), BLOCK):
+            part = landed[first : first + BLOCK]
+            reflected[first : first + BLOCK] = self.reflectance[part] * (received[part] / scale)
         return landed, reflected, gone / scale
 
     def shoot_all(self, flux, rays):
