@@ -46,12 +46,14 @@ def rays_due(errors, taken, target, power=1.0):
 def next_pass(due, taken, most, cost, rays_left):
     """Receivers that the next pass is for, in order, int64 (K,), and rays of a replicate for each of all, int64 (N,).
 
-    A power of two, so that neighbours share its even spread; fewer for all where the pass could not be afforded.
+    The power of two next to what they are due, so that neighbours share its even spread, and none above what they may
+    have; fewer for all where the pass could not be afforded.
 
     Parameters
     ----------
     due : (N,) rays of a replicate
-    taken, most : (N,) rays that receivers have, and that one may have
+    taken : (N,) rays that receivers have
+    most : that one may have
     cost : rays traced for one of all replicates
     """
     allowed = np.maximum(np.minimum(most - taken, GROWTH * taken), 0)

@@ -20,19 +20,19 @@ from .workers import within
 LEAST_FIRST, MOST_FIRST = 2, 8  # rays of a replicate in the first pass; few may miss what is bright and small, and
 MANY_TEXELS = 1 << 16  # not know it, but of so many texels neighbours vouch for each other: others begin with the most
 FIRST_ERROR = 0.07  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
-MOST_RAYS = 2048  # of a replicate
+MOST_RAYS = 2048  # of a replicate; a last few that are not WORTH a pass are not taken
 MOST_COST = 15  # times what the fewest first rays cost may all passes, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
-AIM, DENOISED_AIM = 0.95, 1.05  # of the target: what receivers are due is an estimate, and a denoiser takes off some;
-STEP = 0.85  # of the error there is, or less: receivers that are due hardly more would get nothing
+AIM, DENOISED_AIM = 0.95, 1.05  # of the target: what receivers are due is an estimate, and a denoiser takes off some
+STEP = 0.85  # of the error there is, at the most, is aimed at: who is due hardly more than it has gets nothing
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
-SPECKLE = 2.0  # times the target: what is left, when it is met, is seen; four times the rays for that, but no more than
-SPECKLE_SHARE = 1 / 8  # of those traced, once: with the pass that is likely the last,
-LAST = 1.5  # times the target or nearer, or else in one more,
-LEAST_SPECKLES = 1 / 1024  # of the receivers, where there are so many
+SPECKLE = 2.0  # times the target: receivers that noisy are seen when it is met. Once they get as many rays as may be:
+LAST = 1.5  # with a pass from so many times the target, which is likely the last, or in one of their own,
+LEAST_SPECKLES = 1 / 1024  # if so many of the receivers are speckles,
+SPECKLE_SHARE = 1 / 8  # of at most so many of the rays that were traced
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 
 
@@ -115,7 +115,7 @@ def gather_until(
     first = first_rays(fewest, error) if seconds_left() == np.inf else fewest
     active, further = np.arange(count), np.full(count, first)
     aim = AIM if denoise is None or grid is None else DENOISED_AIM
-    budget, idle, is_cleared, begin, rms = 0, 0, False, 0.0, np.inf
+    budget, idle, had_speckles, begin, rms = 0, 0, False, 0.0, np.inf
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
@@ -138,9 +138,9 @@ def gather_until(
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
         in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
-        due, clears = _due(found, samples, probes, error, aim * error, is_cleared)
+        due, has_speckles = _due(found, samples, probes, error, aim, had_speckles)
         active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
-        is_cleared |= clears
+        had_speckles |= has_speckles
         if idle == MOST_IDLE:
             stopped = "as further rays no longer help"
         if stopped is not None:
@@ -187,21 +187,23 @@ def _denoised(denoise, grid, found: _Found, gathered, direct, probes: Probes) ->
     return min(found, other, key=lambda estimate: estimate.rms)
 
 
-def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, is_cleared):
-    """Rays of a replicate that each receiver is due (N,), and whether speckles are among them: once they are cleared.
+def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, had_speckles):
+    """Rays of a replicate that each receiver is due (N,), and whether speckles get theirs with them.
 
-    A speckle is a receiver whose noise would be seen when the target is met.
+    A speckle is a receiver whose noise would be seen when the target is met; that they had theirs is ``had_speckles``.
     """
     is_met = found.rms <= error
     due = np.zeros(len(samples.taken))
     if not is_met:
         errors = measured_errors(found.noise, probes.receivers, found.squares)
-        due = rays_due(errors, samples.taken, min(aim, STEP * found.rms))
+        due = rays_due(errors, samples.taken, min(aim * error, STEP * found.rms))
     is_speckle = found.noise > SPECKLE * error
     cost = GROWTH * samples.cost * samples.taken[is_speckle].sum()
-    is_time = found.rms <= LAST * error and cost <= SPECKLE_SHARE * samples.rays
-    clears = not is_cleared and (is_speckle.mean() >= LEAST_SPECKLES if is_met else is_time)
-    return np.where(clears & is_speckle, np.inf, due), clears
+    are_due = is_speckle.any() and found.rms <= LAST * error and cost <= SPECKLE_SHARE * samples.rays
+    if is_met:
+        are_due = is_speckle.mean() >= LEAST_SPECKLES
+    has_speckles = bool(are_due) and not had_speckles
+    return np.where(has_speckles & is_speckle, np.inf, due), has_speckles
 
 
 def _next(due, samples: _Samples, is_met, rays_left, rays_in_time):
@@ -212,6 +214,8 @@ def _next(due, samples: _Samples, is_met, rays_left, rays_in_time):
     active, further = next_pass(due, samples.taken, MOST_RAYS, samples.cost, min(rays_left, rays_in_time))
     if len(wanting) and len(active) >= ENOUGH * len(wanting):
         return active, further, None
-    if not len(wanting) or is_met:
+    if is_met:
         return active, further, ""
+    if not len(wanting):
+        return active, further, "as receivers have the most rays that they may"
     return active, further, "by the time limit" if rays_in_time < rays_left else "by the budget of rays"

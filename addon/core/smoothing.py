@@ -100,17 +100,17 @@ def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, va
 
 
 def kept(grid: TexelGrid, values, smooth_values, deviations):
-    """Smoothed light (N, 3), scaled so that around every texel there is as much of it as there was in ``values``.
+    """Smoothed light (N, 3), scaled so that around every texel there is about as much as there was in ``values``.
 
     Most rays see less than the mean and few see much more. Smoothing that minds values takes these few for something
     else, and the light for less than it is, by the more the noisier it was: ``deviations`` (N,) say where to put it.
-    What noise is common to both falls out of their difference.
+    What noise is common to both falls out of their difference. Charts that lie side by side share what they lost: calm
+    ones get little of it.
     """
     luminance = (smooth_values @ LUMINANCE).astype(np.float32)
-    given = deviations * _around(grid, values @ LUMINANCE - luminance)
-    noise = _around(grid, deviations)
+    given, noise = _around(grid, values @ LUMINANCE - luminance), _around(grid, deviations)
     given /= np.where(noise > 0, noise, 1)
-    given /= np.where(luminance > 0, luminance, np.inf)
+    given *= deviations / np.where(luminance > 0, luminance, np.inf)
     # what is dimmer than rounding beside what is bright has no share that means something
     return (1 + np.clip(given, -MOST_KEPT, MOST_KEPT))[:, None] * smooth_values
 

@@ -6,12 +6,15 @@ import pytest
 from addon.core.allocation import GROWTH
 from addon.core.gather_job import REPLICATES
 from addon.core.passes import (
+    AIM,
+    DENOISED_AIM,
     ENOUGH,
     FREE_RAYS,
     LAST,
     LEAST_FIRST,
     LEAST_SPECKLES,
     MOST_FIRST,
+    MOST_RAYS,
     SPECKLE_SHARE,
     _due,
     _Found,
@@ -38,68 +41,98 @@ def test_a_budget_goes_by_the_square_of_a_small_error_and_has_a_least():
     assert ray_budget(1, 0.5) == FREE_RAYS
 
 
-def after_a_pass(noise, error_found):
-    """What a first pass of 8 rays found, of that stated noise (N,) and an RMS error as measured at every 8th."""
+def after_a_pass(noise, error_found, taken):
+    """What passes of so many rays found, of that stated noise (N,) and an RMS error as measured at every 8th."""
     samples = _Samples(COUNT)
-    samples.taken[:], samples.rays = 8, 8 * REPLICATES * COUNT
+    samples.taken[:], samples.rays = taken, taken * REPLICATES * COUNT
     chosen = np.arange(0, COUNT, 8)
     measured = Measured(np.zeros(len(chosen)), np.zeros(len(chosen)), 0)
     squares = np.full(len(chosen), error_found**2)
     return _Found(np.zeros((COUNT, 3)), noise, squares), samples, Probes(chosen, np.ones(len(chosen)), measured)
 
 
-def next_of(noise, error_found, error, rays_left=1e12, rays_in_time=np.inf, is_cleared=False):
-    """What comes after it: samples so far, receivers, further rays, what stops it, whether it clears speckles."""
-    found, samples, probes = after_a_pass(noise, error_found)
-    due, clears = _due(found, samples, probes, error, error, is_cleared)
-    return samples, *_next(due, samples, error_found <= error, rays_left, rays_in_time), clears
+def next_of(noise, error_found, rays_left=1e12, rays_in_time=np.inf, had_speckles=False, aim=AIM, taken=8):
+    """What comes after it for a target of 0.02: samples so far, receivers, further rays, what stops it, whether
+    speckles get theirs."""
+    found, samples, probes = after_a_pass(noise, error_found, taken)
+    due, has_speckles = _due(found, samples, probes, 0.02, aim, had_speckles)
+    return samples, *_next(due, samples, error_found <= 0.02, rays_left, rays_in_time), has_speckles
 
 
 SPECKLED = np.where(np.arange(COUNT) % 32 == 0, 0.5, 0.001)
 
 
 def test_a_target_that_is_met_leaves_speckles_an_eighth_of_the_rays_at_the_most():
-    samples, active, further, stopped, clears = next_of(SPECKLED, 0.01, 0.02)
+    samples, active, further, stopped, has_speckles = next_of(SPECKLED, 0.01)
     assert stopped is None
-    assert clears
+    assert has_speckles
     assert set(active) <= set(np.flatnonzero(SPECKLED > 0.1))
     assert 0 < samples.cost * further[active].sum() <= SPECKLE_SHARE * samples.rays
 
 
-def test_speckles_are_cleared_once():
-    _, active, _, stopped, clears = next_of(SPECKLED, 0.01, 0.02, is_cleared=True)
+def test_speckles_get_their_rays_once():
+    _, active, _, stopped, has_speckles = next_of(SPECKLED, 0.01, had_speckles=True)
     assert len(active) == 0
     assert stopped == ""
-    assert not clears
+    assert not has_speckles
 
 
 def test_few_speckles_are_not_worth_a_pass():
     noise = np.full(COUNT, 0.001)
     noise[: int(LEAST_SPECKLES * COUNT) - 1] = 0.5
-    assert next_of(noise, 0.01, 0.02)[3] == ""
+    assert next_of(noise, 0.01)[3] == ""
 
 
-def test_the_pass_that_is_likely_the_last_clears_speckles_too_where_they_are_few():
-    few, many = np.arange(COUNT) % 64 == 0, np.arange(COUNT) % 8 == 0
-    for speckles, near, expected in ((few, LAST, True), (few, 1.1 * LAST, False), (many, LAST, False)):
+def test_speckles_get_theirs_with_the_pass_that_is_likely_the_last_where_they_are_few():
+    few, many, none = np.arange(COUNT) % 64 == 0, np.arange(COUNT) % 8 == 0, np.zeros(COUNT, bool)
+    cases = (
+        (few, 0.99 * LAST, True),
+        (few, 1.01 * LAST, False),
+        (many, 0.99 * LAST, False),
+        (none, 0.99 * LAST, False),
+    )
+    for speckles, near, expected in cases:
         # as measured, what is noisy is not wrong: only as speckles do they get rays
         noise = np.where(speckles, 0.5, 0.02)
-        _, _, further, _, clears = next_of(noise, 0.02 * near, 0.02)
-        assert clears == expected
-        assert (further[speckles] == GROWTH * 8).all() == expected
+        _, _, further, _, has_speckles = next_of(noise, 0.02 * near)
+        assert has_speckles == expected
+        assert (further[speckles] == GROWTH * 8).all() == (expected or not speckles.any())
+
+
+def test_a_target_missed_by_a_hair_is_gone_on_for():
+    for aim in (AIM, DENOISED_AIM):
+        active, further = next_of(np.full(COUNT, 0.0201), 0.0201, aim=aim)[1:3]
+        assert len(active) == COUNT
+        assert (further > 0).all()
+
+
+def test_who_can_wait_for_a_denoiser_takes_fewer_rays():
+    noise = np.linspace(0.01, 0.06, COUNT)
+    alone, denoised = (next_of(noise, 0.035, aim=aim)[2].sum() for aim in (AIM, DENOISED_AIM))
+    assert denoised < alone
 
 
 def test_a_target_that_is_met_is_stopped_by_nothing():
     for noise, rays_left in ((np.full(COUNT, 0.001), 1e12), (np.full(COUNT, 0.5), 0)):
-        assert next_of(noise, 0.01, 0.02, rays_left)[3] == ""
+        assert next_of(noise, 0.01, rays_left)[3] == ""
 
 
 def test_a_target_that_is_missed_names_what_ran_out():
     noise = np.full(COUNT, 0.2)
-    few = ENOUGH * REPLICATES
-    assert next_of(noise, 0.2, 0.02, few)[3] == "by the budget of rays"
-    assert next_of(noise, 0.2, 0.02, 1e12, few)[3] == "by the time limit"
-    _, active, further, stopped, _ = next_of(noise, 0.2, 0.02)
+    assert next_of(noise, 0.2, 1)[3] == "by the budget of rays"
+    assert next_of(noise, 0.2, 1e12, 1)[3] == "by the time limit"
+    assert next_of(noise, 0.2, taken=MOST_RAYS)[3] == "as receivers have the most rays that they may"
+    _, active, further, stopped, _ = next_of(noise, 0.2)
     assert stopped is None
     assert len(active) == COUNT
     assert (further[active] >= 8).all()
+
+
+def test_a_pass_that_few_of_those_that_want_it_can_be_given_is_not_worth_it():
+    # all are due some more, but when rays are short only the loudest are left, of whom there may be too few
+    for share, expected in ((ENOUGH / 2, "by the budget of rays"), (2 * ENOUGH, None)):
+        loud = np.arange(COUNT) < share * COUNT
+        samples, active, further, stopped, _ = next_of(np.where(loud, 0.05, 0.02), 0.026, REPLICATES * 16 * loud.sum())
+        assert set(active) == set(np.flatnonzero(loud))
+        assert samples.cost * further[active].sum() <= REPLICATES * 16 * loud.sum()
+        assert stopped == expected
