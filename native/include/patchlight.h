@@ -145,6 +145,7 @@ pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patc
  *
  *   reaches       2 * patch_count [m]
  *   first, count  the range of sides
+ *   rays          of a side; half of them where these all agree
  *   out_openness  2 * patch_count, at the sides' indices
  */
 void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *reaches, size_t first, size_t count,
