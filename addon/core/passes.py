@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .allocation import GROWTH, measured_errors, next_pass, rays_due
+from .allocation import measured_errors, next_pass, rays_due
 from .denoising import denoised
 from .gather_job import REPLICATES, GatherJob, estimate_of
 from .measuring import probes_among
@@ -29,10 +29,8 @@ MOST_IDLE = 2  # the noise
 AIM, DENOISED_AIM = 0.95, 1.05  # of the target: what receivers are due is an estimate, and a denoiser takes off some
 STEP = 0.85  # of the error there is, at the most, is aimed at: who is due hardly more than it has gets nothing
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
-SPECKLE = 2.0  # times the target: receivers that noisy are seen when it is met. Once they get as many rays as may be:
-LAST = 1.5  # with a pass from so many times the target, which is likely the last, or in one of their own,
-LEAST_SPECKLES = 1 / 1024  # if so many of the receivers are speckles,
-SPECKLE_SHARE = 1 / 8  # of at most so many of the rays that were traced
+SPECKLE = 2.0  # times the target: receivers that noisy are seen when it is met; then they get four times their rays,
+SPECKLE_SHARE = 1 / 8  # once, and of all no more than so many of those traced
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 
 
@@ -138,9 +136,9 @@ def gather_until(
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
         in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
-        due, has_speckles = _due(found, samples, probes, error, aim, had_speckles)
+        due = _due(found, samples, probes, error, aim, had_speckles)
         active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
-        had_speckles |= has_speckles
+        had_speckles |= rms <= error
         if idle == MOST_IDLE:
             stopped = "as further rays no longer help"
         if stopped is not None:
@@ -188,22 +186,14 @@ def _denoised(denoise, grid, found: _Found, gathered, direct, probes: Probes) ->
 
 
 def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, had_speckles):
-    """Rays of a replicate that each receiver is due (N,), and whether speckles get theirs with them.
+    """Rays of a replicate that each receiver is due (N,): when the target is met, only speckles, which have them once.
 
-    A speckle is a receiver whose noise would be seen when the target is met; that they had theirs is ``had_speckles``.
+    A speckle is a receiver whose noise is seen then.
     """
-    is_met = found.rms <= error
-    due = np.zeros(len(samples.taken))
-    if not is_met:
-        errors = measured_errors(found.noise, probes.receivers, found.squares)
-        due = rays_due(errors, samples.taken, min(aim * error, STEP * found.rms))
-    is_speckle = found.noise > SPECKLE * error
-    cost = GROWTH * samples.cost * samples.taken[is_speckle].sum()
-    are_due = is_speckle.any() and found.rms <= LAST * error and cost <= SPECKLE_SHARE * samples.rays
-    if is_met:
-        are_due = is_speckle.mean() >= LEAST_SPECKLES
-    has_speckles = bool(are_due) and not had_speckles
-    return np.where(has_speckles & is_speckle, np.inf, due), has_speckles
+    if found.rms <= error:
+        return np.where((found.noise > SPECKLE * error) & (not had_speckles), np.inf, 0.0)
+    errors = measured_errors(found.noise, probes.receivers, found.squares)
+    return rays_due(errors, samples.taken, min(aim * error, STEP * found.rms))
 
 
 def _next(due, samples: _Samples, is_met, rays_left, rays_in_time):

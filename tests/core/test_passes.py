@@ -3,16 +3,13 @@
 import numpy as np
 import pytest
 
-from addon.core.allocation import GROWTH
 from addon.core.gather_job import REPLICATES
 from addon.core.passes import (
     AIM,
     DENOISED_AIM,
     ENOUGH,
     FREE_RAYS,
-    LAST,
     LEAST_FIRST,
-    LEAST_SPECKLES,
     MOST_FIRST,
     MOST_RAYS,
     SPECKLE_SHARE,
@@ -52,51 +49,26 @@ def after_a_pass(noise, error_found, taken):
 
 
 def next_of(noise, error_found, rays_left=1e12, rays_in_time=np.inf, had_speckles=False, aim=AIM, taken=8):
-    """What comes after it for a target of 0.02: samples so far, receivers, further rays, what stops it, whether
-    speckles get theirs."""
+    """What comes after it for a target of 0.02: samples so far, receivers, further rays, what stops it."""
     found, samples, probes = after_a_pass(noise, error_found, taken)
-    due, has_speckles = _due(found, samples, probes, 0.02, aim, had_speckles)
-    return samples, *_next(due, samples, error_found <= 0.02, rays_left, rays_in_time), has_speckles
+    due = _due(found, samples, probes, 0.02, aim, had_speckles)
+    return samples, *_next(due, samples, error_found <= 0.02, rays_left, rays_in_time)
 
 
 SPECKLED = np.where(np.arange(COUNT) % 32 == 0, 0.5, 0.001)
 
 
 def test_a_target_that_is_met_leaves_speckles_an_eighth_of_the_rays_at_the_most():
-    samples, active, further, stopped, has_speckles = next_of(SPECKLED, 0.01)
+    samples, active, further, stopped = next_of(SPECKLED, 0.01)
     assert stopped is None
-    assert has_speckles
     assert set(active) <= set(np.flatnonzero(SPECKLED > 0.1))
     assert 0 < samples.cost * further[active].sum() <= SPECKLE_SHARE * samples.rays
 
 
 def test_speckles_get_their_rays_once():
-    _, active, _, stopped, has_speckles = next_of(SPECKLED, 0.01, had_speckles=True)
+    _, active, _, stopped = next_of(SPECKLED, 0.01, had_speckles=True)
     assert len(active) == 0
     assert stopped == ""
-    assert not has_speckles
-
-
-def test_few_speckles_are_not_worth_a_pass():
-    noise = np.full(COUNT, 0.001)
-    noise[: int(LEAST_SPECKLES * COUNT) - 1] = 0.5
-    assert next_of(noise, 0.01)[3] == ""
-
-
-def test_speckles_get_theirs_with_the_pass_that_is_likely_the_last_where_they_are_few():
-    few, many, none = np.arange(COUNT) % 64 == 0, np.arange(COUNT) % 8 == 0, np.zeros(COUNT, bool)
-    cases = (
-        (few, 0.99 * LAST, True),
-        (few, 1.01 * LAST, False),
-        (many, 0.99 * LAST, False),
-        (none, 0.99 * LAST, False),
-    )
-    for speckles, near, expected in cases:
-        # as measured, what is noisy is not wrong: only as speckles do they get rays
-        noise = np.where(speckles, 0.5, 0.02)
-        _, _, further, _, has_speckles = next_of(noise, 0.02 * near)
-        assert has_speckles == expected
-        assert (further[speckles] == GROWTH * 8).all() == (expected or not speckles.any())
 
 
 def test_a_target_missed_by_a_hair_is_gone_on_for():
@@ -122,7 +94,7 @@ def test_a_target_that_is_missed_names_what_ran_out():
     assert next_of(noise, 0.2, 1)[3] == "by the budget of rays"
     assert next_of(noise, 0.2, 1e12, 1)[3] == "by the time limit"
     assert next_of(noise, 0.2, taken=MOST_RAYS)[3] == "as receivers have the most rays that they may"
-    _, active, further, stopped, _ = next_of(noise, 0.2)
+    _, active, further, stopped = next_of(noise, 0.2)
     assert stopped is None
     assert len(active) == COUNT
     assert (further[active] >= 8).all()
@@ -130,9 +102,11 @@ def test_a_target_that_is_missed_names_what_ran_out():
 
 def test_a_pass_that_few_of_those_that_want_it_can_be_given_is_not_worth_it():
     # all are due some more, but when rays are short only the loudest are left, of whom there may be too few
+    samples = after_a_pass(np.zeros(COUNT), 0.1, 8)[1]
     for share, expected in ((ENOUGH / 2, "by the budget of rays"), (2 * ENOUGH, None)):
         loud = np.arange(COUNT) < share * COUNT
-        samples, active, further, stopped, _ = next_of(np.where(loud, 0.05, 0.02), 0.026, REPLICATES * 16 * loud.sum())
+        rays_left = REPLICATES * 16 * loud.sum()
+        active, further, stopped = _next(np.where(loud, 40.0, 12.0), samples, False, rays_left, np.inf)
         assert set(active) == set(np.flatnonzero(loud))
-        assert samples.cost * further[active].sum() <= REPLICATES * 16 * loud.sum()
+        assert samples.cost * further[active].sum() <= rays_left
         assert stopped == expected
