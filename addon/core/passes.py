@@ -113,7 +113,7 @@ def gather_until(
     first = first_rays(fewest, error) if seconds_left() == np.inf else fewest
     active, further = np.arange(count), np.full(count, first)
     aim = AIM if denoise is None or grid is None else DENOISED_AIM
-    budget, idle, had_speckles, begin, rms = 0, 0, False, 0.0, np.inf
+    budget, idle, met, begin, rms = 0, 0, None, 0.0, np.inf
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
@@ -136,11 +136,14 @@ def gather_until(
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
         in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
-        due = _due(found, samples, probes, error, aim, had_speckles)
+        due = _due(found, samples, probes, error, aim)
         active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
-        had_speckles |= rms <= error
         if idle == MOST_IDLE:
             stopped = "as further rays no longer help"
+        if met:
+            # speckles had their pass; if the error is over the target again, that is chance
+            found, stopped = found if rms <= error else met, ""
+        met = found if rms <= error else None
         if stopped is not None:
             found = found if is_asked else _denoised(denoise, grid, found, gathered, direct, probes)
             traced = samples.rays, probes.measured.rays
@@ -185,13 +188,13 @@ def _denoised(denoise, grid, found: _Found, gathered, direct, probes: Probes) ->
     return min(found, other, key=lambda estimate: estimate.rms)
 
 
-def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, had_speckles):
-    """Rays of a replicate that each receiver is due (N,): when the target is met, only speckles, which have them once.
+def _due(found: _Found, samples: _Samples, probes: Probes, error, aim):
+    """Rays of a replicate that each receiver is due (N,): when the target is met, only speckles.
 
     A speckle is a receiver whose noise is seen then.
     """
     if found.rms <= error:
-        return np.where((found.noise > SPECKLE * error) & (not had_speckles), np.inf, 0.0)
+        return np.where(found.noise > SPECKLE * error, np.inf, 0.0)
     errors = measured_errors(found.noise, probes.receivers, found.squares)
     return rays_due(errors, samples.taken, min(aim * error, STEP * found.rms))
 

@@ -48,10 +48,10 @@ def after_a_pass(noise, error_found, taken):
     return _Found(np.zeros((COUNT, 3)), noise, squares), samples, Probes(chosen, np.ones(len(chosen)), measured)
 
 
-def next_of(noise, error_found, rays_left=1e12, rays_in_time=np.inf, had_speckles=False, aim=AIM, taken=8):
+def next_of(noise, error_found, rays_left=1e12, rays_in_time=np.inf, aim=AIM, taken=8):
     """What comes after it for a target of 0.02: samples so far, receivers, further rays, what stops it."""
     found, samples, probes = after_a_pass(noise, error_found, taken)
-    due = _due(found, samples, probes, 0.02, aim, had_speckles)
+    due = _due(found, samples, probes, 0.02, aim)
     return samples, *_next(due, samples, error_found <= 0.02, rays_left, rays_in_time)
 
 
@@ -63,12 +63,6 @@ def test_a_target_that_is_met_leaves_speckles_an_eighth_of_the_rays_at_the_most(
     assert stopped is None
     assert set(active) <= set(np.flatnonzero(SPECKLED > 0.1))
     assert 0 < samples.cost * further[active].sum() <= SPECKLE_SHARE * samples.rays
-
-
-def test_speckles_get_their_rays_once():
-    _, active, _, stopped = next_of(SPECKLED, 0.01, had_speckles=True)
-    assert len(active) == 0
-    assert stopped == ""
 
 
 def test_a_target_missed_by_a_hair_is_gone_on_for():
