@@ -29,7 +29,7 @@ MOST_IDLE = 2  # the noise
 AIM, DENOISED_AIM = 0.95, 1.05  # of the target: what receivers are due is an estimate, and a denoiser takes off some
 STEP = 0.85  # of the error there is, at the most, is aimed at: who is due hardly more than it has gets nothing
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
-SPECKLE = 2.0  # times the target: receivers that noisy are seen when it is met; then they get four times their rays,
+SPECKLE = 2.0  # times the target: receivers that noisy are seen when it is met; then they get GROWTH times more,
 SPECKLE_SHARE = 1 / 8  # once, and of all no more than so many of those traced
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 

@@ -79,7 +79,7 @@ def test_smoothing_keeps_the_light_that_few_rays_found():
     # eight rays of a replicate, of which one in fifty finds a lamp: half of all texels see nothing of it
     found = np.random.default_rng(5).binomial(8, 0.02, (side * side, 4, 1)) / 0.16 * np.ones(3)
     values, _ = run(grid, receivers, found.astype(np.float32), 8)
-    # 9216 texels in ten squares' worth, each kept but for what is clipped; without it 4 % and more is lost
+    # every square of 1089 texels is kept but for what is clipped; without that 5 % is lost
     assert values.mean() == pytest.approx(found.mean(), rel=0.01)
     assert values.std() < 0.3 * found.mean(axis=1).std()
 
