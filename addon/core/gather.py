@@ -21,7 +21,7 @@ from .smoothing import TexelGrid, blurred, pooled
 from .texel_light import TexelLight, split_where_blocked
 from .workers import within
 
-LOOK_RAYS = 1  # of a replicate, for the first look at the texels' light, which the first pass then sees
+LOOK_RAYS, TEXEL_LOOK_RAYS = 4, 1  # for a first look at the light, which the first pass sees on texels, blurred
 NEAR = 10.0  # texels: rays that hit from nearer do not take a texel's light
 NEAR_SHARE = 1 / 16  # of the scene, at the most: in a coarse lightmap all would be near
 FAR = 3.3  # times as far do rays go on from patches, where texels have a light of their own: few are left that need it
@@ -116,7 +116,7 @@ def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
         return pooled(job.kernel.workers, grid, job.receivers, of_one_ray)
 
     first = first_direct(trace, error, seed, within(on_step, 0.0, 0.25))
-    look, _, rays = job.gathered(LOOK_RAYS, seed + 2, within(on_step, 0.25, 0.25))
+    look, rays = job.glimpse(TEXEL_LOOK_RAYS if grid else LOOK_RAYS, seed + 2, within(on_step, 0.25, 0.25))
     if grid is not None:
         look = blurred(job.kernel.workers, grid, job.receivers, look)
     scale = scale_of(first.values + look)

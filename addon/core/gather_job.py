@@ -67,12 +67,18 @@ class GatherJob:
         return self.kernel.direct(self.solved.sources, self.receivers, samples, seed, on_step)
 
     def gather(self, selected, first, take, seed, sums, on_step=None) -> int:
-        """Add rays ``first`` to ``first + take`` of every replicate to the selected receivers' ``sums`` (N, R, 3)."""
+        """Add each of R replicates' rays ``first`` to ``first + take`` to selected receivers' ``sums`` (N, R, 3)."""
         light = (self.solved.patches, self.texel_light, self.solved.sources)
         selected = np.ascontiguousarray(selected, np.uint32)
         return self.kernel.gather(
-            *light, self.receivers, self.guides, selected, REPLICATES, first, take, seed, sums, on_step
+            *light, self.receivers, self.guides, selected, sums.shape[1], first, take, seed, sums, on_step
         )
+
+    def glimpse(self, count, seed, on_step=None):
+        """Light by ``count`` rays of each receiver in all, whatever its error (N, 3), and the rays traced."""
+        sums = np.zeros((len(self.receivers), 1, 3), np.float32)
+        rays = self.gather(np.arange(len(sums)), 0, count, seed, sums, on_step)
+        return sums[:, 0] / np.float32(count), rays
 
     def gathered(self, count, seed, on_step=None):
         """Light by ``count`` rays of each replicate (N, 3), the variance of its luminance (N,), the rays traced."""

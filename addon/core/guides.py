@@ -14,7 +14,8 @@ from .kernel import GUIDE_CELLS, KernelScene
 from .receivers import Receivers
 from .z_order import z_order
 
-GROUP = 256  # receivers that share a guide
+LEAST_GROUP, MOST_GROUP = 256, 1024  # receivers that share a guide: the more of them there are, the nearer they are
+GROUPS = 1024  # about, between these
 LEARNERS = 32  # of a group, that look for all
 LEARNING_RAYS = 32  # of each
 EVEN = 0.25  # of the rays go everywhere alike: what the learners missed keeps a bounded weight
@@ -84,7 +85,8 @@ def _neighbours(receivers):
     order = np.argsort(way << np.uint64(30) | z_order(*cells.T), kind="stable")
     # a group ends where its receivers look elsewhere, or when it is full
     turns = np.flatnonzero(np.diff(way[order], prepend=way[order][:1] + np.uint64(1)))
-    cuts = [np.arange(turn, end, GROUP) for turn, end in zip(turns, np.append(turns[1:], len(order)))]
+    full = int(np.clip(len(order) // GROUPS, LEAST_GROUP, MOST_GROUP))
+    cuts = [np.arange(turn, end, full) for turn, end in zip(turns, np.append(turns[1:], len(order)))]
     starts = np.concatenate(cuts)
     ends = np.append(starts[1:], len(order))
     ordered = receivers.positions[order]

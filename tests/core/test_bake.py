@@ -82,9 +82,12 @@ def test_the_report_tells_what_ran(cornell_lightmaps):
 @pytest.mark.parametrize("scene", [cornell_box(), cube_room()], ids=["cornell", "lamp"])
 @pytest.mark.parametrize("error", [0.1, 0.05])
 def test_the_estimated_error_is_honest(scene, error):
-    """Against a bake of another seed whose error is five times smaller, and so counts for 1 / 25 in the squares."""
-    runs = [colours_and_errors(scene, error, seed) for seed in (1, 2, 3)]
-    truth, _ = colours_and_errors(scene, error / 5, 4)
+    """Against a bake of another seed whose error is five times smaller, and so counts for 1 / 25 in the squares.
+
+    The factor is 1.5 because one bake's errors, found and stated, spread by a third: a few texels have most of them.
+    """
+    runs = [colours_and_errors(scene, error, seed) for seed in range(1, 7)]
+    truth, _ = colours_and_errors(scene, error / 5, 9)
     found = np.sqrt(np.mean([np.mean(relative(pixels, truth) ** 2) for pixels, _ in runs]))
     stated = np.sqrt(np.mean([estimate**2 for _, estimate in runs]))
     assert found < 1.5 * stated

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from addon.core.emitters import emitters_of
-from addon.core.guides import EVEN, GROUP, WIDEST, _shares, learn_guides, no_guides
+from addon.core.guides import EVEN, LEAST_GROUP, WIDEST, _shares, learn_guides, no_guides
 from addon.core.kernel import GUIDE_CELLS
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
@@ -119,7 +119,7 @@ def test_groups_are_near():
     receivers = whole_floor()
     guides = learned(box_with_a_hole(GREY), receivers, lambda kernel, solved, guides, rays: guides)
     counts = np.bincount(guides.groups[guides.groups >= 0], minlength=len(guides.shares))
-    assert 0 < counts.min() <= counts.max() <= GROUP
+    assert 0 < counts.min() <= counts.max() <= LEAST_GROUP
     for group in range(len(guides.shares)):
         members = receivers.positions[guides.groups == group]
         assert np.ptp(members, axis=0).max() <= WIDEST * np.ptp(receivers.positions, axis=0).max()
