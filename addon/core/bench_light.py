@@ -65,10 +65,8 @@ class _System:
         """A run, as ``measured`` wants it, that solves with these settings and a seed of its turn."""
 
         def run(turn):
-            turned = replace(settings, seed=settings.seed + turn)
-            solution = solve_patches(
-                self._kernel, self._patches, self._emitted, settings.solver, settings.method, turned, lambda done: None
-            )
+            how = settings.solver, settings.method, settings.error, settings.seed + turn
+            solution = solve_patches(self._kernel, self._patches, self._emitted, *how, lambda done: None)
             return lambda: self._judged(solution)
 
         return run

@@ -21,7 +21,9 @@ from .smoothing import TexelGrid, blurred, pooled
 from .texel_light import TexelLight, split_where_blocked
 from .workers import within
 
-LOOK_RAYS, TEXEL_LOOK_RAYS = 4, 1  # for a first look at the light, which the first pass sees on texels, blurred
+LOOK_RAYS, TEXEL_LOOK_RAYS = 4, 1  # for a look at the light, which is blurred where there are texels
+LOOKS = 4  # the first sees the patches' light, each other what the one before it found on texels: patches straddle what
+# light does, and what they leave wrong falls by the reflectance from look to look
 NEAR = 10.0  # texels: rays that hit from nearer do not take a texel's light
 NEAR_SHARE = 1 / 16  # of the scene, at the most: in a coarse lightmap all would be near
 FAR = 3.3  # times as far do rays go on from patches, where texels have a light of their own: few are left that need it
@@ -85,7 +87,8 @@ def gather_irradiance(
     job = GatherJob(kernel, solved, receivers, weights, no_guides(len(receivers)))
     direct, shadow_rays, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.4))
     if grid is not None:
-        job = _with_texel_light(job, grid, direct, look)
+        job, further = _with_texel_light(job, grid, direct, look, seed + 10)
+        looks += further
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     gathered = gather_until(
         replace(job, guides=guides), grid, direct, denoise, error, seed, seconds_left, within(on_step, 0.4, 0.6)
@@ -125,10 +128,15 @@ def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
     return direct.values, direct.rays, look, rays
 
 
-def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look) -> GatherJob:
-    """The job whose rays see what a first look found on the texels."""
+def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed):
+    """The job whose rays see the texels' light, found by a first ``look`` and mended by others; the rays of these."""
     reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
     cells = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
     no_light = np.zeros((len(direct), 3), np.float32)
     job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, cells, no_light, reach))
-    return job.seeing(grid, direct, look)
+    job, rays = job.seeing(grid, direct, look), 0
+    for again in range(1, LOOKS):
+        look, traced = job.glimpse(TEXEL_LOOK_RAYS, seed + again)
+        job = job.seeing(grid, direct, blurred(job.kernel.workers, grid, job.receivers, look))
+        rays += traced
+    return job, rays

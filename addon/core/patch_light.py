@@ -17,8 +17,9 @@ from .texel_light import NO_TEXEL_LIGHT
 
 POINTS = 8  # of a patch side: where its direct light is measured
 SMALL = 0.25  # of a full-size patch's area: smaller ones are measured at one point
-PATCH_SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 1
-PATCH_SKY_RAYS = 4  # of each point
+SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 1
+SKY_RAYS = 4  # of each point
+QUICK_ERROR, QUICKER = 0.2, 4  # where errors of this or more are good enough, so many times fewer rays are
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,24 +45,27 @@ def measure_patches(
     patches: Patches,
     emitters: Emitters,
     sky,
+    error: float,
     seed: int,
     known: PatchLight | None,
     on_step,
 ) -> PatchLight:
-    """Light on patches; on those of cells that are as they were in ``known``, what was measured there."""
+    """Light on patches to about an ``error``; on cells that are as they were in ``known``, what it was there."""
+    share = QUICKER if error >= QUICK_ERROR else 1
     new, old = np.ones(len(patches), bool), np.zeros(0, bool)
     if known is not None:
         is_same = np.bincount(patches.cells) == np.bincount(known.patches.cells)
         new, old = ~is_same[patches.cells], is_same[known.patches.cells]
-    direct, spread, shadow_rays = _direct_on_patches(scene, kernel, patches, new, emitters, seed, on_step)
-    daylight, sky_rays = _sky_on_patches(scene, kernel, patches, new, emitters, sky, seed)
+    light = scene, kernel, patches, new, emitters
+    direct, spread, shadow_rays = _direct_on_patches(*light, SHADOW_SAMPLES // share, seed, on_step)
+    daylight, sky_rays = _sky_on_patches(*light, sky, SKY_RAYS // share, seed)
     if known is not None:
         for all_of_them, before in ((direct, known.direct), (spread, known.spread), (daylight, known.daylight)):
             all_of_them[np.repeat(~new, 2)] = before[np.repeat(old, 2)]
     return PatchLight(patches, direct, spread, daylight, shadow_rays + sky_rays + (known.rays if known else 0))
 
 
-def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, seed, on_step):
+def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, samples, seed, on_step):
     """The lights' mean irradiance on every side, float64 (2 P, 3), its spread over the side (2 P,), and shadow rays.
 
     A full-size patch is measured at several points; a small one at one, as its neighbours stand in for it when light is
@@ -71,7 +75,7 @@ def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, seed, 
     rays = 0
     for chosen, points, share in _measured(patches, wanted):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
-        values, _, traced = kernel.direct(emitters, receivers, min(points, PATCH_SHADOW_SAMPLES), seed)
+        values, _, traced = kernel.direct(emitters, receivers, min(points, samples), seed)
         values = values.reshape(-1, 2, points, 3)
         irradiance[chosen] = values.mean(axis=2, dtype=np.float64)
         spread[chosen] = np.ptp(values.mean(axis=3), axis=2)
@@ -80,7 +84,7 @@ def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, seed, 
     return irradiance.reshape(-1, 3), spread.ravel(), rays
 
 
-def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, seed):
+def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, count, seed):
     """Mean irradiance of every side from the constant world, float64 (2 P, 3), and the rays it took.
 
     The sky is gathered with all surfaces black.
@@ -100,7 +104,6 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, seed
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
         sums = np.zeros((len(receivers), 1, 3), np.float32)
         everyone = np.arange(len(receivers), dtype=np.uint32)
-        count = PATCH_SKY_RAYS
         rays += kernel.gather(
             black, NO_TEXEL_LIGHT, emitters, receivers, no_guides(len(receivers)), everyone, 1, 0, count, seed, sums
         )

@@ -14,7 +14,7 @@ from .emitters import LUMINANCE, Emitters
 from .exchange import exchange_of
 from .kernel import KernelScene
 from .parted import finer_where_parted
-from .patch_light import PatchLight, measure_patches
+from .patch_light import QUICK_ERROR, PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
 from .patches import cut, grid_of, patch_size_for, subdivide, triangle_areas
 from .progressive import solve_progressive
@@ -31,9 +31,8 @@ DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic: where errors larger th
 PATCH_OF = 4  # each of which sees the light of its like where it can, and patches only near by
 COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
 ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
-LIGHTMAP_ERROR = 0.05  # at the least, that patches are solved to where a lightmap has texels on
+LIGHTMAP_ERROR = 0.2  # at the least, that patches are good enough for where a lightmap has texels on
 MOST_AREA = 0.9  # of the scene: rays see these texels' own light, and patches only behind them and far off
-QUICK_ERROR = 0.2  # of the solutions that say where it does
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it
@@ -68,19 +67,18 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
     solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene))
     sky = np.asarray(exitance_from_radiance(scene.world_radiance), np.float32).reshape(1, 3)
     has_texels = settings.target == "lightmap" and _target_share(scene) >= MOST_AREA
-    least_error = LIGHTMAP_ERROR if has_texels else 0.0
+    error = max(settings.error, LIGHTMAP_ERROR) if has_texels else settings.error
 
     def measure(patches, on_step, known=None):
-        return measure_patches(scene, kernel, patches, emitters, sky, settings.seed, known, on_step)
+        return measure_patches(scene, kernel, patches, emitters, sky, error, settings.seed, known, on_step)
 
     def solve(lit, error, on_step):
         emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
-        precision = replace(settings, error=max(error, least_error))
-        found = solve_patches(kernel, lit.patches, emitted, solver, method, precision, on_step)
+        found = solve_patches(kernel, lit.patches, emitted, solver, method, error, settings.seed, on_step)
         # no surface sends less than it emits: what overshooting or an iteration left below that is its error
         return replace(found, radiosity=np.maximum(found.radiosity, emitted))
 
-    budget = _patch_budget(solver, settings)
+    budget = _patch_budget(solver, settings, error)
     if settings.patch_size or solver == "stochastic":
         # where a patch costs rays only, as many of one size are as good in the same time
         if settings.patch_size:
@@ -90,8 +88,8 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
             patches = finer_where_parted(scene, kernel, grid, budget, settings.seed)
         lit = measure(patches, within(on_step, 0.0, 0.4))
     else:
-        lit = _decompose(scene, kernel, budget, settings, measure, solve, within(on_step, 0.0, 0.4))
-    solution = solve(lit, settings.error, within(on_step, 0.5, 0.5))
+        lit = _decompose(scene, kernel, budget, error, settings.seed, measure, solve, within(on_step, 0.0, 0.4))
+    solution = solve(lit, error, within(on_step, 0.5, 0.5))
 
     patches = lit.patches
     reaches, is_confined = reaches_of(scene, kernel, patches, settings.seed)
@@ -114,29 +112,28 @@ def _target_share(scene: Scene) -> float:
     return sum(areas[obj.span].sum() for obj in scene.objects if obj.is_target) / max(areas.sum(), 1e-300)
 
 
-def _patch_budget(solver: str, settings: BakeSettings) -> int:
+def _patch_budget(solver: str, settings: BakeSettings, error: float) -> int:
     """How many patches, about, a solver is given."""
     budget = PATCH_BUDGETS[solver]
     if solver != "stochastic" or settings.patch_size:
         return budget
-    wanted = budget * min(1.0, DRAFT_ERROR / settings.error)
+    wanted = budget * min(1.0, DRAFT_ERROR / error)
     if settings.target == "lightmap" and not settings.density:
         wanted = min(wanted, settings.texels / PATCH_OF)
     return int(max(wanted, DRAFT_BUDGET))
 
 
-def _decompose(scene, kernel, budget, settings, measure, solve, on_step) -> PatchLight:
+def _decompose(scene, kernel, budget, error, seed, measure, solve, on_step) -> PatchLight:
     """Patches that are small where the light changes, and the light on them."""
     coarse = int(budget * COARSE_SHARE)
     grid = grid_of(scene, patch_size_for(scene, coarse), coarse)
     along = np.ones(len(grid), np.int64)
     rounds = 1 + 2 * len(ROUND_SHARES)  # to measure, and to solve and measure again each time
-    lit = measure(cut(scene, kernel, grid, along, settings.seed), within(on_step, 0.0, 1 / rounds))
+    lit = measure(cut(scene, kernel, grid, along, seed), within(on_step, 0.0, 1 / rounds))
     count = len(lit.patches)
     for turn, share in enumerate(ROUND_SHARES):
         begin = 1 + 2 * turn
-        quick = max(settings.error, QUICK_ERROR)
-        first = solve(lit, quick, within(on_step, begin / rounds, 1 / rounds))
+        first = solve(lit, max(error, QUICK_ERROR), within(on_step, begin / rounds, 1 / rounds))
         reflectance = np.maximum(lit.patches.side_reflectance, LEAST_REFLECTANCE)
         irradiance = (first.radiosity / reflectance) @ LUMINANCE
         finer_along = finer(grid, along, lit.patches, irradiance, lit.spread, count + int(share * budget))
@@ -144,18 +141,18 @@ def _decompose(scene, kernel, budget, settings, measure, solve, on_step) -> Patc
         if (finer_along == along).all():
             break
         along = finer_along
-        patches = cut(scene, kernel, grid, along, settings.seed)
+        patches = cut(scene, kernel, grid, along, seed)
         lit = measure(patches, within(on_step, (begin + 1) / rounds, 1 / rounds), lit)
     return lit
 
 
-def solve_patches(kernel, patches, emitted, solver, method, settings, on_step) -> Solution:
+def solve_patches(kernel, patches, emitted, solver, method, error, seed, on_step) -> Solution:
     """Radiosity of all sides from what they emit, float64 (2 P, 3) [W/m^2], by a named solver and method."""
     areas, reflectance = patches.side_areas, np.minimum(patches.side_reflectance, MOST_REFLECTANCE)
     if solver == "stochastic":
-        rays = int(min(max(8 * len(emitted), 1 << 18) * (0.05 / settings.error), 1 << 25))
-        return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, settings.seed, on_step)
-    estimator = form_factors(kernel, method, settings.error, settings.seed)
+        rays = int(min(max(8 * len(emitted), 1 << 18) * (0.05 / error), 1 << 25))
+        return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, seed, on_step)
+    estimator = form_factors(kernel, method, error, seed)
     if solver == "progressive":
         return solve_progressive(estimator, reflectance, emitted, areas, UNSHOT_LIMIT, on_step)
     require_size = require_direct_size if solver == "direct" else require_exchange_size

@@ -122,7 +122,7 @@ class _Shooting:
         )
         self._samples[shooting] += np.diff(first_rays).astype(np.uint32)
         self.rays += int(first_rays[-1])
-        landed = np.flatnonzero(received.any(axis=1))
+        landed = np.flatnonzero(received[:, 0] | received[:, 1] | received[:, 2])
         reflected = np.empty((len(landed), 3))
         for first in range(0, len(landed), BLOCK):
             part = landed[first : first + BLOCK]

@@ -123,7 +123,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
             return;
         }
-        if (solution->kinds[side] == PL_SIDE_MIXED || (seen && job->lights->count < MANY_LIGHTS))
+        if (solution->kinds[side] == PL_SIDE_MIXED || ((seen || goes_on) && job->lights->count < MANY_LIGHTS))
             sample_direct(job, &hit, side, &random, weight, io_sum);
         else
             add(io_sum, solution->direct + 3 * side, weight);
