@@ -214,6 +214,20 @@ def smooth(workers, grid, receivers, values, variances, step, stops_on_value):
     return out_values, out_variances
 
 
+def clamp_outliers(workers, grid, receivers, values, variances):
+    """Values float32 (N, 3), those that stand alone by their noise (N,) brought back among their neighbours."""
+    out = np.zeros_like(values)
+    where, (height, width) = receivers.arrays(), grid.receivers.shape
+
+    def call(start, stop):
+        _kernel.clamp_outliers(
+            grid.receivers, width, height, grid.spacing, where, values, variances, start, stop - start, out
+        )
+
+    workers.each_range(height, 16, call)
+    return out
+
+
 def sobol_points(first, count, seed):
     """Points of a 4-D Owen-scrambled Sobol sequence, from number ``first`` on: float32 (count, 4) in [0, 1)."""
     out = np.empty((count, 4), np.float32)

@@ -12,7 +12,7 @@ import numpy as np
 
 from .charts import Charts
 from .emitters import LUMINANCE
-from .kernel import smooth
+from .kernel import clamp_outliers, smooth
 from .receivers import Receivers
 from .relative import scale_of
 from .scene import Scene
@@ -92,10 +92,12 @@ def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, va
     scales = scale_of(near)
     relative = pooled(workers, grid, receivers, variances / scales**2 * taken) / taken
     noise = np.minimum(relative * scales**2, LARGEST_VARIANCE).astype(np.float32)
-    del variances, scales, relative
+    del scales, relative
     smooth_values, left = values, noise
     for step in STEPS:
         smooth_values, left = smooth(workers, grid, receivers, smooth_values, left, step, True)
+    # by their own noise: pooled, what is far off by chance is as certain as its neighbours
+    smooth_values = clamp_outliers(workers, grid, receivers, smooth_values, variances)
     return kept(grid, values, smooth_values, np.sqrt(noise)), left
 
 

@@ -388,4 +388,13 @@ void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const f
                int32_t step, int32_t stops_on_value, int32_t first_row, int32_t row_count, float *out_values,
                float *out_variances);
 
+/*
+ * What stands alone, brought back among its neighbours: a receiver's value is scaled so that its luminance is no more
+ * than the brightest and no less than the darkest of the eight texels around it that are samples of the same surface,
+ * but by no more than its own noise explains: twice its standard deviation. Smoothing that minds values leaves such
+ * noise. With fewer than three such texels a value stays as it is. Arguments as of pl_smooth; not in place.
+ */
+void pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
+                       const float *variances, int32_t first_row, int32_t row_count, float *out_values);
+
 #endif

@@ -227,6 +227,15 @@ static bool grid_is_valid(const pl_texel_grid *grid, size_t receivers) {
            indices_are_below(grid->receivers, (size_t)grid_size(grid), receivers, "grid");
 }
 
+/* Whether a call over some of its rows can be made; where not, what is wrong is set. */
+static bool grid_fits(const pl_texel_grid *grid, size_t receivers, int first_row, int row_count) {
+    if (grid_is_valid(grid, receivers) && door_range_fits((size_t)first_row, (size_t)row_count, (size_t)grid->height))
+        return true;
+    if (!PyErr_Occurred())
+        PyErr_SetString(PyExc_ValueError, "grid: its size is none");
+    return false;
+}
+
 PyObject *door_smooth(PyObject *self, PyObject *args) {
     enum { VALUES = RECEIVER_ARRAY_COUNT + 1, VARIANCES, OUT_VALUES, OUT_VARIANCES, ARRAYS };
     PyObject *receiver_arrays, *objects[ARRAYS];
@@ -247,10 +256,7 @@ PyObject *door_smooth(PyObject *self, PyObject *args) {
         return NULL;
     const pl_receivers receivers = receivers_of(arrays);
     grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
-    if (!grid_is_valid(&grid, receivers.count) ||
-        !door_range_fits((size_t)first_row, (size_t)row_count, (size_t)grid.height)) {
-        if (!PyErr_Occurred())
-            PyErr_SetString(PyExc_ValueError, "grid: its size is none");
+    if (!grid_fits(&grid, receivers.count, first_row, row_count)) {
         door_release(arrays, ARRAYS);
         return NULL;
     }
@@ -258,6 +264,39 @@ PyObject *door_smooth(PyObject *self, PyObject *args) {
     Py_BEGIN_ALLOW_THREADS
     pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value, first_row,
               row_count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, ARRAYS);
+    Py_RETURN_NONE;
+}
+
+PyObject *door_clamp_outliers(PyObject *self, PyObject *args) {
+    enum { VALUES = RECEIVER_ARRAY_COUNT + 1, VARIANCES, OUT_VALUES, ARRAYS };
+    PyObject *receiver_arrays, *objects[ARRAYS];
+    pl_texel_grid grid;
+    int first_row, row_count;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OiifOOOiiO", &objects[RECEIVER_ARRAY_COUNT], &grid.width, &grid.height, &grid.spacing,
+                          &receiver_arrays, &objects[VALUES], &objects[VARIANCES], &first_row, &row_count,
+                          &objects[OUT_VALUES]))
+        return NULL;
+    door_array arrays[] = {RECEIVER_ARRAYS(0),
+                           {"grid", 'i', 1, grid_size(&grid), false, {0}},
+                           {"values", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
+                           {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}}};
+    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS))
+        return NULL;
+    const pl_receivers receivers = receivers_of(arrays);
+    grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
+    if (!grid_fits(&grid, receivers.count, first_row, row_count)) {
+        door_release(arrays, ARRAYS);
+        return NULL;
+    }
+
+    Py_BEGIN_ALLOW_THREADS
+    pl_clamp_outliers(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, first_row, row_count,
+                      arrays[OUT_VALUES].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, ARRAYS);

@@ -186,6 +186,8 @@ static PyMethodDef methods[] = {
     {"smooth", door_smooth, METH_VARARGS,
      "smooth(grid, width, height, spacing, receivers, values, variances, step, stops_on_value, first_row, "
      "row_count, out_values, out_variances)"},
+    {"clamp_outliers", door_clamp_outliers, METH_VARARGS,
+     "clamp_outliers(grid, width, height, spacing, receivers, values, variances, first_row, row_count, out_values)"},
     {"rasterise_texels", rasterise_texels, METH_VARARGS,
      "rasterise_texels(uvs, width, height, out_triangles, out_distances, out_barycentrics)"},
     {"pack_charts", pack_charts, METH_VARARGS,

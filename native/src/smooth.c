@@ -113,3 +113,49 @@ void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const f
         }
     }
 }
+
+enum { LEAST_NEIGHBOURS = 3 };          /* fewer do not tell what is usual */
+static const float most_deviations = 2; /* that noise explains */
+
+/* What a texel's value is to be multiplied with to lie among those of its neighbours. */
+static float clamping(const smooth_job *job, int32_t row, int32_t column, size_t receiver) {
+    const pl_texel_grid *grid = job->grid;
+    const middle at = {job->receivers->positions + 3 * receiver, vec3_from(job->receivers->normals + 3 * receiver),
+                       luminance(job->values + CHANNELS * receiver), job->variances[receiver]};
+    float darkest = INFINITY, brightest = 0;
+    int neighbours = 0;
+    for (int32_t dy = -1; dy <= 1; ++dy) {
+        for (int32_t dx = -1; dx <= 1; ++dx) {
+            const int32_t y = row + dy, x = column + dx;
+            if ((!dx && !dy) || y < 0 || y >= grid->height || x < 0 || x >= grid->width)
+                continue;
+            const int32_t other = grid->receivers[(size_t)y * (size_t)grid->width + (size_t)x];
+            if (other < 0 || !(tap_weight(job, &at, (size_t)other, dx, dy) > 0))
+                continue;
+            const float there = luminance(job->values + CHANNELS * (size_t)other);
+            darkest = lesser(darkest, there);
+            brightest = greater(brightest, there);
+            ++neighbours;
+        }
+    }
+    if (neighbours < LEAST_NEIGHBOURS || !(at.luminance > 0))
+        return 1;
+    const float most = most_deviations * sqrtf(at.variance);
+    const float wanted = lesser(greater(at.luminance, darkest), brightest);
+    return lesser(greater(wanted, at.luminance - most), at.luminance + most) / at.luminance;
+}
+
+void pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
+                       const float *variances, int32_t first_row, int32_t row_count, float *out_values) {
+    const smooth_job job = {grid, receivers, values, variances, 1, false};
+    for (int32_t row = first_row; row < first_row + row_count; ++row) {
+        for (int32_t column = 0; column < grid->width; ++column) {
+            const int32_t receiver = grid->receivers[(size_t)row * (size_t)grid->width + (size_t)column];
+            if (receiver < 0)
+                continue;
+            const float factor = clamping(&job, row, column, (size_t)receiver);
+            for (size_t k = CHANNELS * (size_t)receiver; k < CHANNELS * ((size_t)receiver + 1); ++k)
+                out_values[k] = factor * values[k];
+        }
+    }
+}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from addon.core.gather_job import estimate_of
-from addon.core.kernel import smooth
+from addon.core.kernel import clamp_outliers, smooth
 from addon.core.receivers import Receivers
 from addon.core.smoothing import MOST_KEPT, TexelGrid, blurred, kept, smoothed
 from addon.core.workers import Workers
@@ -60,6 +60,45 @@ def test_a_level_is_what_its_definition_says(step, stops_on_value):
     # 25 weights of float32, the exponents known to 1e-6 of at most some tens
     assert found[0] == pytest.approx(exact[0], abs=3e-5)
     assert found[1] == pytest.approx(exact[1], abs=3e-6)
+
+
+def test_outliers_are_clamped_as_the_definition_says():
+    rng = np.random.default_rng(6)
+    side = 12
+    normals = np.float32([0, 0, 1]) + 0.3 * rng.standard_normal((side * side, 3)).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    grid, receivers = wall(side, 0.003 * rng.standard_normal(side * side), normals)
+    grid.receivers[rng.random((side, side)) < 0.4] = -1
+    values = rng.random((side * side, 3)).astype(np.float32)
+    variances = (0.02 * rng.random(side * side)).astype(np.float32)
+    with Workers(2) as workers:
+        found = clamp_outliers(workers, grid, receivers, values, variances)
+    exact = reference.clamp_outliers(
+        grid.receivers, SPACING, receivers.positions, normals.astype(float), values, variances
+    )
+    is_set = grid.receivers[grid.receivers >= 0]
+    # one factor, a ratio of luminances of float32
+    assert found[is_set] == pytest.approx(exact[is_set], rel=1e-5)
+    is_changed = (exact[is_set] != values[is_set]).any(axis=1)
+    assert 0.1 < is_changed.mean() < 0.9
+
+
+def test_a_texel_that_stands_alone_goes_and_a_line_and_an_edge_stay():
+    grid, receivers = wall()
+    light = np.ones((SIDE, SIDE))
+    light[20, :] = 3.0  # a line of single texels
+    light[:, 30:] += 1.0
+    light[0, 0] = 5.0  # three neighbours tell as well as eight
+    with_one = light.copy()
+    with_one[10, 10] = 50.0
+    with_one[12, 35] = 0.1
+    values = np.float32(with_one.reshape(-1, 1)) * np.ones(3, np.float32)
+    with Workers(2) as workers:
+        found = clamp_outliers(workers, grid, receivers, values, np.full(SIDE * SIDE, 1e4, np.float32))
+        certain = clamp_outliers(workers, grid, receivers, values, np.zeros(SIDE * SIDE, np.float32))
+    light[0, 0] = 1.0
+    assert found[:, 0] == pytest.approx(light.ravel(), rel=1e-6)  # float32
+    assert (certain == values).all()
 
 
 def test_a_blur_keeps_the_light_that_few_rays_found():

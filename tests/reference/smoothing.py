@@ -36,6 +36,25 @@ def smooth(grid, spacing, positions, normals, values, variances, step, stops_on_
     return out, out_variances
 
 
+def clamp_outliers(grid, spacing, positions, normals, values, variances):
+    """Values (N, 3) scaled to lie in luminance among those of the same surface around them, if noise explains it."""
+    out, luminances = values.copy(), values @ LUMINANCE
+    for row, column in zip(*np.nonzero(grid >= 0)):
+        here, around = grid[row, column], []
+        for y, x in np.ndindex(*grid.shape):
+            is_beside = max(abs(y - row), abs(x - column)) == 1
+            if not is_beside or grid[y, x] < 0:
+                continue
+            there, reach = grid[y, x], spacing * np.hypot(y - row, x - column)
+            if _same_surface(positions[here], positions[there], normals[here], normals[there], reach) > 0:
+                around.append(luminances[there])
+        if len(around) >= 3 and luminances[here] > 0:
+            change = np.clip(luminances[here], min(around), max(around)) - luminances[here]
+            most = 2 * np.sqrt(variances[here])
+            out[here] *= 1 + np.clip(change, -most, most) / luminances[here]
+    return out
+
+
 def _falling(x):
     """About exp(-x), with an end."""
     return max(0.0, 1 - x / 8) ** 8
