@@ -25,7 +25,7 @@ from .unwrap import unwrap
 from .workers import OnProgress, Progress, Workers
 
 # how a bake's time falls to its stages, for the progress bar
-STAGE_SHARES = {"unwrap": 0.1, "texels": 0.05, "solve": 0.2, "gather": 0.65}
+STAGE_SHARES = {"unwrap": 0.15, "texels": 0.05, "solve": 0.1, "gather": 0.7}
 
 
 @dataclass(frozen=True, slots=True)

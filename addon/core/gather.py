@@ -85,9 +85,9 @@ def gather_irradiance(
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
     weights = grid.shown if grid else np.ones(len(receivers), np.float32)
     job = GatherJob(kernel, solved, receivers, weights, no_guides(len(receivers)))
-    direct, shadow_rays, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.4))
+    direct, shadow_rays, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.35))
     if grid is not None:
-        job, further = _with_texel_light(job, grid, direct, look, seed + 10)
+        job, further = _with_texel_light(job, grid, direct, look, seed + 2, within(on_step, 0.35, 0.05))
         looks += further
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     gathered = gather_until(
@@ -119,7 +119,7 @@ def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
         return pooled(job.kernel.workers, grid, job.receivers, of_one_ray)
 
     first = first_direct(trace, error, seed, within(on_step, 0.0, 0.25))
-    look, rays = job.glimpse(TEXEL_LOOK_RAYS if grid else LOOK_RAYS, seed + 2, within(on_step, 0.25, 0.25))
+    look, rays = job.glimpse(LOOK_RAYS if grid is None else TEXEL_LOOK_RAYS, seed + 2, within(on_step, 0.25, 0.25))
     if grid is not None:
         look = blurred(job.kernel.workers, grid, job.receivers, look)
     scale = scale_of(first.values + look)
@@ -128,7 +128,7 @@ def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
     return direct.values, direct.rays, look, rays
 
 
-def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed):
+def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed, on_step):
     """The job whose rays see the texels' light, found by a first ``look`` and mended by others; the rays of these."""
     reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
     cells = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
@@ -136,7 +136,8 @@ def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed):
     job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, cells, no_light, reach))
     job, rays = job.seeing(grid, direct, look), 0
     for again in range(1, LOOKS):
-        look, traced = job.glimpse(TEXEL_LOOK_RAYS, seed + again)
+        share = 1 / (LOOKS - 1)
+        look, traced = job.glimpse(TEXEL_LOOK_RAYS, seed + 1000 * again, within(on_step, (again - 1) * share, share))
         job = job.seeing(grid, direct, blurred(job.kernel.workers, grid, job.receivers, look))
         rays += traced
     return job, rays

@@ -14,8 +14,8 @@ from .kernel import GUIDE_CELLS, KernelScene
 from .receivers import Receivers
 from .z_order import z_order
 
-LEAST_GROUP, MOST_GROUP = 256, 1024  # receivers that share a guide: the more of them there are, the nearer they are
-GROUPS = 1024  # about, between these
+GROUPS = 1024  # of receivers that share a guide, about; each with as many as
+LEAST_GROUP, MOST_GROUP = 256, 1024  # at the least, and at the most: of a fine lightmap more are near each other
 LEARNERS = 32  # of a group, that look for all
 LEARNING_RAYS = 32  # of each
 EVEN = 0.25  # of the rays go everywhere alike: what the learners missed keeps a bounded weight
@@ -85,14 +85,18 @@ def _neighbours(receivers):
     order = np.argsort(way << np.uint64(30) | z_order(*cells.T), kind="stable")
     # a group ends where its receivers look elsewhere, or when it is full
     turns = np.flatnonzero(np.diff(way[order], prepend=way[order][:1] + np.uint64(1)))
-    full = int(np.clip(len(order) // GROUPS, LEAST_GROUP, MOST_GROUP))
-    cuts = [np.arange(turn, end, full) for turn, end in zip(turns, np.append(turns[1:], len(order)))]
+    cuts = [np.arange(turn, end, group_size(len(order))) for turn, end in zip(turns, np.append(turns[1:], len(order)))]
     starts = np.concatenate(cuts)
     ends = np.append(starts[1:], len(order))
     ordered = receivers.positions[order]
     width = np.maximum.reduceat(ordered, starts) - np.minimum.reduceat(ordered, starts)
     is_narrow = width.max(axis=1) <= WIDEST * extent
     return order, starts[is_narrow], ends[is_narrow]
+
+
+def group_size(count: int) -> int:
+    """How many of so many receivers share a guide, at the most."""
+    return min(max(count // GROUPS, LEAST_GROUP), MOST_GROUP)
 
 
 def _runs(starts, ends):

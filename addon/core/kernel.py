@@ -215,7 +215,10 @@ def smooth(workers, grid, receivers, values, variances, step, stops_on_value):
 
 
 def clamp_outliers(workers, grid, receivers, values, variances):
-    """Values float32 (N, 3), those that stand alone by their noise (N,) brought back among their neighbours."""
+    """Values float32 (N, 3), those that stand alone by their noise brought back among their neighbours.
+
+    ``variances`` (N,): of their luminance before it was smoothed. See native/include/patchlight.h, pl_clamp_outliers.
+    """
     out = np.zeros_like(values)
     where, (height, width) = receivers.arrays(), grid.receivers.shape
 

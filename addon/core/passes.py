@@ -138,7 +138,7 @@ def gather_until(
         elif idle == MOST_IDLE:
             stopped = "as further rays no longer help"
         else:
-            due = _due(found, samples, probes, min(aim * error, STEP * rms))
+            due = _due(found, samples, probes, error, aim)
             in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
             active, further, stopped = _next(due, samples, budget - samples.rays, in_time)
         if stopped is not None:
@@ -185,9 +185,10 @@ def _denoised(denoise, grid, found: _Found, gathered, direct, probes: Probes) ->
     return min(found, other, key=lambda estimate: estimate.rms)
 
 
-def _due(found: _Found, samples: _Samples, probes: Probes, target):
-    """Rays of a replicate that each receiver is due for the target, (N,)."""
-    return rays_due(measured_errors(found.noise, probes.receivers, found.squares), samples.taken, target)
+def _due(found: _Found, samples: _Samples, probes: Probes, error, aim):
+    """Rays of a replicate that each receiver is due (N,) for ``aim`` times the target, or a step towards it."""
+    errors = measured_errors(found.noise, probes.receivers, found.squares)
+    return rays_due(errors, samples.taken, min(aim * error, STEP * found.rms))
 
 
 def _next(due, samples: _Samples, rays_left, rays_in_time):

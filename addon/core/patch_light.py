@@ -19,7 +19,7 @@ POINTS = 8  # of a patch side: where its direct light is measured
 SMALL = 0.25  # of a full-size patch's area: smaller ones are measured at one point
 SHADOW_SAMPLES = 8  # of each point of a full-size patch; small ones take 1
 SKY_RAYS = 4  # of each point
-QUICK_ERROR, QUICKER = 0.2, 4  # where errors of this or more are good enough, so many times fewer rays are
+QUICK_ERROR, FEWER = 0.2, 4  # where errors of this or more are good enough, so many times fewer rays are
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +51,14 @@ def measure_patches(
     on_step,
 ) -> PatchLight:
     """Light on patches to about an ``error``; on cells that are as they were in ``known``, what it was there."""
-    share = QUICKER if error >= QUICK_ERROR else 1
+    fewer = FEWER if error >= QUICK_ERROR else 1
     new, old = np.ones(len(patches), bool), np.zeros(0, bool)
     if known is not None:
         is_same = np.bincount(patches.cells) == np.bincount(known.patches.cells)
         new, old = ~is_same[patches.cells], is_same[known.patches.cells]
     light = scene, kernel, patches, new, emitters
-    direct, spread, shadow_rays = _direct_on_patches(*light, SHADOW_SAMPLES // share, seed, on_step)
-    daylight, sky_rays = _sky_on_patches(*light, sky, SKY_RAYS // share, seed)
+    direct, spread, shadow_rays = _direct_on_patches(*light, SHADOW_SAMPLES // fewer, seed, on_step)
+    daylight, sky_rays = _sky_on_patches(*light, sky, SKY_RAYS // fewer, seed)
     if known is not None:
         for all_of_them, before in ((direct, known.direct), (spread, known.spread), (daylight, known.daylight)):
             all_of_them[np.repeat(~new, 2)] = before[np.repeat(old, 2)]

@@ -27,12 +27,11 @@ from .workers import within
 
 # patches, about, that each solver is given; triangles are never joined, so there may be more
 PATCH_BUDGETS = {"direct": 1200, "conjugate-gradient": 5000, "progressive": 3000, "stochastic": 60000}
-DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic: where errors larger than this are asked for, or few texels,
-PATCH_OF = 4  # each of which sees the light of its like where it can, and patches only near by
+DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic, at the least, where errors larger than this are good enough
 COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
 ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
-LIGHTMAP_ERROR = 0.2  # at the least, that patches are good enough for where a lightmap has texels on
-MOST_AREA = 0.9  # of the scene: rays see these texels' own light, and patches only behind them and far off
+LIGHTMAP_ERROR = QUICK_ERROR  # at the least, is good enough for patches where a lightmap has texels on
+MOST_AREA = 0.9  # of the scene: looks from texel to texel take off what patches have wrong
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it
@@ -64,17 +63,30 @@ class Solved:
 
 def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, on_step) -> Solved:
     """Subdivide, measure direct light on the patches, solve for the light that bounces."""
+    error = settings.error
+    if settings.target == "lightmap" and _target_share(scene) >= MOST_AREA:
+        error = max(error, LIGHTMAP_ERROR)
+    # half of the bar is kept for solving once more
+    solved = _solved(scene, kernel, emitters, settings, error, within(on_step, 0.0, 0.5))
+    if error > settings.error and len(solved.sources) > len(emitters):
+        # receivers sample bright sides as lights: what is wrong with these no look takes off
+        rays = solved.rays
+        solved = _solved(scene, kernel, emitters, settings, settings.error, within(on_step, 0.5, 0.5))
+        solved = replace(solved, rays={stage: count + rays[stage] for stage, count in solved.rays.items()})
+    return solved
+
+
+def _solved(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, error, on_step) -> Solved:
+    """The same with patches that are good to about an error."""
     solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene))
     sky = np.asarray(exitance_from_radiance(scene.world_radiance), np.float32).reshape(1, 3)
-    has_texels = settings.target == "lightmap" and _target_share(scene) >= MOST_AREA
-    error = max(settings.error, LIGHTMAP_ERROR) if has_texels else settings.error
 
     def measure(patches, on_step, known=None):
         return measure_patches(scene, kernel, patches, emitters, sky, error, settings.seed, known, on_step)
 
-    def solve(lit, error, on_step):
+    def solve(lit, precision, on_step):
         emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
-        found = solve_patches(kernel, lit.patches, emitted, solver, method, error, settings.seed, on_step)
+        found = solve_patches(kernel, lit.patches, emitted, solver, method, precision, settings.seed, on_step)
         # no surface sends less than it emits: what overshooting or an iteration left below that is its error
         return replace(found, radiosity=np.maximum(found.radiosity, emitted))
 
@@ -117,10 +129,7 @@ def _patch_budget(solver: str, settings: BakeSettings, error: float) -> int:
     budget = PATCH_BUDGETS[solver]
     if solver != "stochastic" or settings.patch_size:
         return budget
-    wanted = budget * min(1.0, DRAFT_ERROR / error)
-    if settings.target == "lightmap" and not settings.density:
-        wanted = min(wanted, settings.texels / PATCH_OF)
-    return int(max(wanted, DRAFT_BUDGET))
+    return int(max(budget * min(1.0, DRAFT_ERROR / error), DRAFT_BUDGET))
 
 
 def _decompose(scene, kernel, budget, error, seed, measure, solve, on_step) -> PatchLight:

@@ -85,7 +85,8 @@ def pooled(workers: Workers, grid: TexelGrid | None, receivers: Receivers, of_on
 def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, variances, near, taken):
     """Gathered light (N, 3) smoothed by its variances (N,): values float32 (N, 3), variance of luminance (N,).
 
-    ``near`` (N, 3) is the light ``blurred``, ``taken`` (N,) how many rays each is of.
+    ``near`` (N, 3) is the light ``blurred``, ``taken`` (N,) how many rays each is of. What is left standing alone is
+    clamped, which the variance does not tell.
     """
     variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
     # pooled relative to the light there, as the noise of what is bright says nothing of the calm beside it

@@ -249,6 +249,7 @@ typedef struct pl_solution {
  *   reach      rays that hit from nearer [m] do not take a texel's light, which may lie half under something, but go on
  *
  * Backs have no texels: with these given, a receiver's ray that hits one first does not take its mean, but goes on.
+ * Where a ray goes on, it samples the lights if they are few; of many it takes what the patch has of them.
  */
 typedef struct pl_texel_light {
     const float *uvs;
@@ -259,7 +260,8 @@ typedef struct pl_texel_light {
     float reach;
 } pl_texel_light;
 
-/* What gather rays travel through, and what they see there; `lights` as in pl_direct, for mixed sides and near hits. */
+/* What gather rays travel through, and what they see there; `lights` as in pl_direct, for mixed sides and where rays go
+ * on. */
 typedef struct pl_gather_scene {
     const pl_scene *scene;
     const pl_patches *patches;
@@ -392,7 +394,9 @@ void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const f
  * What stands alone, brought back among its neighbours: a receiver's value is scaled so that its luminance is no more
  * than the brightest and no less than the darkest of the eight texels around it that are samples of the same surface,
  * but by no more than its own noise explains: twice its standard deviation. Smoothing that minds values leaves such
- * noise. With fewer than three such texels a value stays as it is. Arguments as of pl_smooth; not in place.
+ * noise. With fewer than three such texels a value stays as it is, and so does black.
+ *
+ *   variances   1 per receiver, of its luminance before it was smoothed; else as of pl_smooth, and not in place
  */
 void pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
                        const float *variances, int32_t first_row, int32_t row_count, float *out_values);

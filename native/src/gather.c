@@ -93,6 +93,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
     const pl_solution *solution = job->solution;
     float weight[3] = {1, 1, 1};
     vec3 origin = frame->origin;
+    bool skips_lights = true; /* what was sampled as a light must not be seen once more */
 
     for (int step = 0; step < MOST_STEPS; ++step) {
         const pl_hit hit = closest_hit(job->scene, origin, direction, 0);
@@ -109,21 +110,25 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         const float *seen = job->texels && !is_back ? texel_hit(job->texels, &hit, &is_split) : NULL;
         const bool takes_texel = seen && ((hit.distance >= job->texels->reach && !is_split) || is_last);
         /* most rays end here, before the patches are touched: what they cost is cache misses */
-        if (takes_texel && (step || !job->has_bright_sides)) {
+        if (takes_texel && !(skips_lights && job->has_bright_sides)) {
             add(io_sum, seen, weight);
             return;
         }
         const size_t side = 2 * (size_t)patch_at(job->patches, hit.triangle, hit.u, hit.v) + is_back;
-        if (step == 0 && solution->kinds[side] == PL_SIDE_LIGHT)
+        if (skips_lights && solution->kinds[side] == PL_SIDE_LIGHT)
             return;
         /* patches let a little light through walls that part them: backs, which no texel has, are not to pass it on */
         const bool goes_on = step == 0 && is_back && job->texels;
-        const bool is_far = !seen && !goes_on && hit.distance >= solution->reaches[side];
-        if (seen ? takes_texel : is_last || (is_far && solution->kinds[side] != PL_SIDE_MIXED)) {
+        const bool is_mixed = solution->kinds[side] == PL_SIDE_MIXED;
+        /* a mean has what bright sides give: where these are lights, what is mixed cannot be put together of both */
+        const bool is_far =
+            !seen && !goes_on && !(is_mixed && job->has_bright_sides) && hit.distance >= solution->reaches[side];
+        if (seen ? takes_texel : is_last || (is_far && !is_mixed)) {
             add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
             return;
         }
-        if (solution->kinds[side] == PL_SIDE_MIXED || ((seen || goes_on) && job->lights->count < MANY_LIGHTS))
+        skips_lights = is_mixed || ((seen || goes_on) && job->lights->count < MANY_LIGHTS);
+        if (skips_lights)
             sample_direct(job, &hit, side, &random, weight, io_sum);
         else
             add(io_sum, solution->direct + 3 * side, weight);

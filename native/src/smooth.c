@@ -142,7 +142,8 @@ static float clamping(const smooth_job *job, int32_t row, int32_t column, size_t
         return 1;
     const float most = most_deviations * sqrtf(at.variance);
     const float wanted = lesser(greater(at.luminance, darkest), brightest);
-    return lesser(greater(wanted, at.luminance - most), at.luminance + most) / at.luminance;
+    const float factor = lesser(greater(wanted, at.luminance - most), at.luminance + most) / at.luminance;
+    return factor < INFINITY ? factor : 1;
 }
 
 void pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from addon.core.emitters import emitters_of
-from addon.core.guides import EVEN, LEAST_GROUP, WIDEST, _shares, learn_guides, no_guides
+from addon.core.guides import EVEN, LEAST_GROUP, MOST_GROUP, WIDEST, _shares, group_size, learn_guides, no_guides
 from addon.core.kernel import GUIDE_CELLS
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
@@ -113,6 +113,10 @@ def test_what_is_too_bright_to_square_is_shared_as_the_brightest():
         shares = _shares(moments)
     assert shares.sum() == pytest.approx(1, abs=1e-5)  # 64 float32 additions
     assert (shares[0, ::2] > shares[0, 1::2]).all()
+
+
+def test_groups_grow_with_the_lightmap_between_two_sizes():
+    assert [group_size(count) for count in (1, 1 << 18, 1 << 19, 1 << 24)] == [LEAST_GROUP, 256, 512, MOST_GROUP]
 
 
 def test_groups_are_near():

@@ -1,4 +1,4 @@
-"""Passes of a gather: how many rays they begin with, may take, and what the last ones are for."""
+"""Passes of a gather: how many rays they begin with, may take, and what ends them."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,6 @@ from addon.core.passes import (
     LEAST_FIRST,
     MOST_FIRST,
     MOST_RAYS,
-    STEP,
     _due,
     _Found,
     _next,
@@ -51,7 +50,7 @@ def after_a_pass(noise, error_found, taken):
 def next_of(noise, error_found, rays_left=1e12, rays_in_time=np.inf, aim=AIM, taken=8):
     """What comes after it for a target of 0.02: samples so far, receivers, further rays, what stops it."""
     found, samples, probes = after_a_pass(noise, error_found, taken)
-    due = _due(found, samples, probes, min(aim * 0.02, STEP * error_found))
+    due = _due(found, samples, probes, 0.02, aim)
     return samples, *_next(due, samples, rays_left, rays_in_time)
 
 

@@ -101,6 +101,19 @@ def test_a_texel_that_stands_alone_goes_and_a_line_and_an_edge_stay():
     assert (certain == values).all()
 
 
+def test_smoothing_leaves_no_texel_alone_that_found_a_lamp_by_chance():
+    side = 96
+    grid, receivers = wall(side)
+    replicates = noisy(np.ones(side * side), 0.02)
+    alone = grid.receivers[48, 48]
+    replicates[alone, 0] = 9.0
+    values, _ = run(grid, receivers, replicates)
+    # 3 as it was found; what it loses is the neighbourhood's, of a thousand texels
+    assert values[alone, 0] == pytest.approx(1, abs=0.05)
+    near = grid.receivers[32:65, 32:65].ravel()
+    assert values[near].mean() == pytest.approx(replicates[near].mean(), rel=1e-3)
+
+
 def test_a_blur_keeps_the_light_that_few_rays_found():
     grid, receivers = wall()
     # one ray in ten finds a lamp: what smoothing takes for noise is all the light there is

@@ -1,4 +1,4 @@
-"""One level of edge-stopping smoothing by its definition, float64 (Dammertz et al. 2010, eq. 7; B3 spline taps)."""
+"""Smoothing by its definition, float64: a level of it (Dammertz et al. 2010, eq. 7; B3 spline taps), and outliers."""
 
 import numpy as np
 

@@ -1,0 +1,55 @@
+"""Sides so bright that receivers sample them as lights: the light is the same as when rays have to find them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.emitters import LUMINANCE, emitters_of
+from addon.core.gather_job import GatherJob
+from addon.core.guides import no_guides
+from addon.core.patch_solution import EVEN, LIGHT
+from addon.core.radiosity import solve_radiosity
+from addon.core.receivers import surface_receivers
+from addon.core.scene import PointLight
+from addon.core.settings import BakeSettings
+from addon.core.smoothing import texel_grid
+from addon.core.texel_light import NO_TEXEL_LIGHT, TexelLight
+from addon.core.texels import texels
+from addon.core.unwrap import unwrap
+from tests.scenes import closed_box, kernel_of
+
+# a cone of three degrees, straight down: a spot 10 cm wide
+SPOT = PointLight("spot", (0.5, 0.5, 0.9), (40.0, 40.0, 40.0), cone_cosines=(0.9984, 0.9986))
+
+
+def texels_of(scene):
+    """A small lightmap's receivers, and what rays need to know of its texels; all light that they see is too near."""
+    charts = unwrap(scene, BakeSettings(texels=1024))
+    texel_map = texels(charts)
+    receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
+    grid = texel_grid(scene, charts, texel_map, receivers)
+    return receivers, TexelLight(grid.uvs, grid.receivers, np.zeros((len(receivers), 3), np.float32), reach=10.0)
+
+
+@pytest.mark.parametrize("has_texels", [False, True], ids=["from patches", "from texel to texel"])
+def test_bright_sides_as_lights_give_what_rays_find_of_them(has_texels):
+    scene = closed_box(lights=(SPOT,))
+    with kernel_of(scene, 2) as kernel:
+        emitters = emitters_of(scene, kernel.centre)
+        solved = solve_radiosity(scene, kernel, emitters, BakeSettings(error=0.02), lambda done: None)
+        patches = solved.patches
+        assert (patches.kinds == LIGHT).any()
+        receivers, texel_light = texels_of(scene)
+        weights, nowhere = np.ones(len(receivers), np.float32), no_guides(len(receivers))
+        job = GatherJob(kernel, solved, receivers, weights, nowhere, texel_light if has_texels else NO_TEXEL_LIGHT)
+        job = job.part(np.arange(0, len(receivers), 8))
+        unlit = replace(patches, kinds=np.where(patches.kinds == LIGHT, EVEN, patches.kinds).astype(np.uint8))
+
+        def light_of(job):
+            return (job.direct(256, 1)[0] + job.gathered(2048, 2)[0]) @ LUMINANCE
+
+        sampled = light_of(job)
+        found = light_of(replace(job, solved=replace(solved, patches=unlit, sources=emitters)))
+    # some hundred receivers with 8192 rays each, of which one in some hundred finds the spot
+    assert sampled.mean() == pytest.approx(found.mean(), rel=0.02)
