@@ -31,7 +31,8 @@ DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic, at the least, where er
 COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
 ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
 LIGHTMAP_ERROR = QUICK_ERROR  # at the least, is good enough for patches where a lightmap has texels on
-MOST_AREA = 0.9  # of the scene: looks from texel to texel take off what patches have wrong
+MOST_AREA = 0.9  # of the scene: looks from texel to texel take off what patches have wrong, unless there are
+MANY_LIGHTS = 64  # or more (as in the kernel): where rays go on they take what patches have of these
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it
@@ -64,7 +65,7 @@ class Solved:
 def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, on_step) -> Solved:
     """Subdivide, measure direct light on the patches, solve for the light that bounces."""
     error = settings.error
-    if settings.target == "lightmap" and _target_share(scene) >= MOST_AREA:
+    if settings.target == "lightmap" and _target_share(scene) >= MOST_AREA and len(emitters) < MANY_LIGHTS:
         error = max(error, LIGHTMAP_ERROR)
     # half of the bar is kept for solving once more
     solved = _solved(scene, kernel, emitters, settings, error, within(on_step, 0.0, 0.5))
