@@ -89,7 +89,7 @@ def _solved(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: Bak
         emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
         found = solve_patches(kernel, lit.patches, emitted, solver, method, precision, settings.seed, on_step)
         # no surface sends less than it emits: what overshooting or an iteration left below that is its error
-        return replace(found, radiosity=np.maximum(found.radiosity, emitted))
+        return replace(found, radiosity=np.maximum(found.radiosity, emitted, out=emitted))
 
     budget = _patch_budget(solver, settings, error)
     if settings.patch_size or solver == "stochastic":

@@ -49,7 +49,7 @@ def solve_stochastic(
     kernel : has ``shoot``, as kernel.KernelScene
     reflectance, emitted : (N, 3) [1], [W/m^2]; areas : (N,) [m^2]
     """
-    column, reflectance = np.asarray(areas, np.float64)[:, None], np.asarray(reflectance, np.float64)
+    column, reflectance = np.asarray(areas, np.float64)[:, None], np.asarray(reflectance)
     emitted_flux = column * np.asarray(emitted, np.float64)
     runs, told = [], 0.0
 
@@ -140,7 +140,7 @@ class _Shooting:
     def bound(self, sides, rest):
         """Of what ``rest`` (K, 3) [W] of sides may still come to, |r|_inf / (1 - max rho): a row of form factors sums
         to 1 at most."""
-        gain = self.reflectance.max(initial=0.0)
+        gain = float(self.reflectance.max(initial=0.0))
         largest = float(np.abs(rest / np.maximum(self.areas[sides], 1e-300)).max(initial=0.0))
         return largest / (1 - gain) if gain < 1 else np.inf
 
