@@ -108,8 +108,9 @@ def test_smoothing_leaves_no_texel_alone_that_found_a_lamp_by_chance():
     alone = grid.receivers[48, 48]
     replicates[alone, 0] = 9.0
     values, _ = run(grid, receivers, replicates)
-    # 3 as it was found; what it loses is the neighbourhood's, of a thousand texels
-    assert values[alone, 0] == pytest.approx(1, abs=0.05)
+    # 3 as it was found, 1.4 if it were not clamped; its neighbours have some of it, and kept() gives it back a little
+    around = grid.receivers[47:50, 47:50].ravel()
+    assert values[alone, 0] < 1.05 * values[around[around != alone], 0].max() < 1.2
     near = grid.receivers[32:65, 32:65].ravel()
     assert values[near].mean() == pytest.approx(replicates[near].mean(), rel=1e-3)
 
