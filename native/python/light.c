@@ -227,12 +227,15 @@ static bool grid_is_valid(const pl_texel_grid *grid, size_t receivers) {
            indices_are_below(grid->receivers, (size_t)grid_size(grid), receivers, "grid");
 }
 
-/* Whether a call over some of its rows can be made; where not, what is wrong is set. */
-static bool grid_fits(const pl_texel_grid *grid, size_t receivers, int first_row, int row_count) {
-    if (grid_is_valid(grid, receivers) && door_range_fits((size_t)first_row, (size_t)row_count, (size_t)grid->height))
+/* The grid that stands behind the receivers' arrays, some rows of which a call is for; else all are released. */
+static bool grid_fits(door_array *arrays, size_t count, pl_texel_grid *grid, int first_row, int row_count) {
+    grid->receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
+    if (grid_is_valid(grid, receivers_of(arrays).count) &&
+        door_range_fits((size_t)first_row, (size_t)row_count, (size_t)grid->height))
         return true;
     if (!PyErr_Occurred())
         PyErr_SetString(PyExc_ValueError, "grid: its size is none");
+    door_release(arrays, count);
     return false;
 }
 
@@ -252,14 +255,10 @@ PyObject *door_smooth(PyObject *self, PyObject *args) {
                            {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
                            {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}},
                            {"out_variances", 'f', 1, AS_MANY_ROWS_AS(0), true, {0}}};
-    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS))
+    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS) ||
+        !grid_fits(arrays, ARRAYS, &grid, first_row, row_count))
         return NULL;
     const pl_receivers receivers = receivers_of(arrays);
-    grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
-    if (!grid_fits(&grid, receivers.count, first_row, row_count)) {
-        door_release(arrays, ARRAYS);
-        return NULL;
-    }
 
     Py_BEGIN_ALLOW_THREADS
     pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value, first_row,
@@ -285,14 +284,10 @@ PyObject *door_clamp_outliers(PyObject *self, PyObject *args) {
                            {"values", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
                            {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
                            {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}}};
-    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS))
+    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS) ||
+        !grid_fits(arrays, ARRAYS, &grid, first_row, row_count))
         return NULL;
     const pl_receivers receivers = receivers_of(arrays);
-    grid.receivers = arrays[RECEIVER_ARRAY_COUNT].view.buf;
-    if (!grid_fits(&grid, receivers.count, first_row, row_count)) {
-        door_release(arrays, ARRAYS);
-        return NULL;
-    }
 
     Py_BEGIN_ALLOW_THREADS
     pl_clamp_outliers(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, first_row, row_count,

@@ -26,6 +26,17 @@ def wall(side=SIDE, heights=None, normals=None):
     return TexelGrid(grid, SPACING, nowhere, ones, ones[:, 0]), receivers
 
 
+def rough_wall(seed, most_variance, holes, side=12):
+    """A wall that is not even, with a share of holes; values (N, 3) and variances (N,) of its texels."""
+    rng = np.random.default_rng(seed)
+    normals = np.float32([0, 0, 1]) + 0.3 * rng.standard_normal((side * side, 3)).astype(np.float32)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    grid, receivers = wall(side, 0.003 * rng.standard_normal(side * side), normals)
+    grid.receivers[rng.random((side, side)) < holes] = -1
+    values = rng.random((side * side, 3)).astype(np.float32)
+    return grid, receivers, values, (most_variance * rng.random(side * side)).astype(np.float32)
+
+
 def noisy(light, deviation, seed=1):
     """Four replicates (N, 4, 3) about the light (N,), grey."""
     rng = np.random.default_rng(seed)
@@ -44,38 +55,22 @@ def run(grid, receivers, means, taken=1):
 @pytest.mark.parametrize("step", [1, 4])
 @pytest.mark.parametrize("stops_on_value", [False, True], ids=["geometry", "value"])
 def test_a_level_is_what_its_definition_says(step, stops_on_value):
-    rng = np.random.default_rng(3)
-    side = 12
-    normals = np.float32([0, 0, 1]) + 0.3 * rng.standard_normal((side * side, 3)).astype(np.float32)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    grid, receivers = wall(side, 0.003 * rng.standard_normal(side * side), normals)
-    grid.receivers[rng.random((side, side)) < 0.2] = -1
-    values = rng.random((side * side, 3)).astype(np.float32)
-    variances = (0.05 * rng.random(side * side)).astype(np.float32)
+    grid, receivers, values, variances = rough_wall(3, 0.05, 0.2)
     with Workers(2) as workers:
         found = smooth(workers, grid, receivers, values, variances, step, stops_on_value)
-    exact = reference.smooth(
-        grid.receivers, SPACING, receivers.positions, normals.astype(float), values, variances, step, stops_on_value
-    )
+    where = grid.receivers, SPACING, receivers.positions, receivers.normals.astype(float)
+    exact = reference.smooth(*where, values, variances, step, stops_on_value)
     # 25 weights of float32, the exponents known to 1e-6 of at most some tens
     assert found[0] == pytest.approx(exact[0], abs=3e-5)
     assert found[1] == pytest.approx(exact[1], abs=3e-6)
 
 
 def test_outliers_are_clamped_as_the_definition_says():
-    rng = np.random.default_rng(6)
-    side = 12
-    normals = np.float32([0, 0, 1]) + 0.3 * rng.standard_normal((side * side, 3)).astype(np.float32)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    grid, receivers = wall(side, 0.003 * rng.standard_normal(side * side), normals)
-    grid.receivers[rng.random((side, side)) < 0.4] = -1
-    values = rng.random((side * side, 3)).astype(np.float32)
-    variances = (0.02 * rng.random(side * side)).astype(np.float32)
+    grid, receivers, values, variances = rough_wall(6, 0.02, 0.4)
     with Workers(2) as workers:
         found = clamp_outliers(workers, grid, receivers, values, variances)
-    exact = reference.clamp_outliers(
-        grid.receivers, SPACING, receivers.positions, normals.astype(float), values, variances
-    )
+    where = grid.receivers, SPACING, receivers.positions, receivers.normals.astype(float)
+    exact = reference.clamp_outliers(*where, values, variances)
     is_set = grid.receivers[grid.receivers >= 0]
     # one factor, a ratio of luminances of float32
     assert found[is_set] == pytest.approx(exact[is_set], rel=1e-5)
