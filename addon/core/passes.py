@@ -29,6 +29,8 @@ MOST_IDLE = 2  # the noise
 AIM, DENOISED_AIM = 0.95, 1.05  # of the target: what receivers are due is an estimate, and a denoiser takes off some
 STEP = 0.85  # of the error there is, at the most, is aimed at: who is due hardly more than it has gets nothing
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
+SPECKLE = 2.0  # times the target: receivers that noisy are seen when it is met; then they get GROWTH times more,
+SPECKLE_SHARE = 1 / 8  # once, and of all no more than so many of those traced
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 
 
@@ -111,7 +113,7 @@ def gather_until(
     first = first_rays(fewest, error) if seconds_left() == np.inf else fewest
     active, further = np.arange(count), np.full(count, first)
     aim = AIM if denoise is None or grid is None else DENOISED_AIM
-    budget, idle, begin, rms = 0, 0, 0.0, np.inf
+    budget, idle, met, begin, rms = 0, 0, None, 0.0, np.inf
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
@@ -133,14 +135,15 @@ def gather_until(
             found, aim = _denoised(denoise, grid, found, gathered, direct, probes), AIM
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
-        if rms <= error:
-            stopped = ""
-        elif idle == MOST_IDLE:
+        in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
+        due = _due(found, samples, probes, error, aim)
+        active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
+        if idle == MOST_IDLE:
             stopped = "as further rays no longer help"
-        else:
-            due = _due(found, samples, probes, error, aim)
-            in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
-            active, further, stopped = _next(due, samples, budget - samples.rays, in_time)
+        if met:
+            # speckles had their pass; if the error is over the target again, that is chance
+            found, stopped = found if rms <= error else met, ""
+        met = found if rms <= error else None
         if stopped is not None:
             found = found if is_asked else _denoised(denoise, grid, found, gathered, direct, probes)
             traced = samples.rays, probes.measured.rays
@@ -186,17 +189,26 @@ def _denoised(denoise, grid, found: _Found, gathered, direct, probes: Probes) ->
 
 
 def _due(found: _Found, samples: _Samples, probes: Probes, error, aim):
-    """Rays of a replicate that each receiver is due (N,) for ``aim`` times the target, or a step towards it."""
+    """Rays of a replicate that each receiver is due (N,): when the target is met, only speckles.
+
+    A speckle is a receiver whose noise is seen then.
+    """
+    if found.rms <= error:
+        return np.where(found.noise > SPECKLE * error, np.inf, 0.0)
     errors = measured_errors(found.noise, probes.receivers, found.squares)
     return rays_due(errors, samples.taken, min(aim * error, STEP * found.rms))
 
 
-def _next(due, samples: _Samples, rays_left, rays_in_time):
+def _next(due, samples: _Samples, is_met, rays_left, rays_in_time):
     """The receivers of the next pass (K,), further rays of each (N,), and what stops it, None where nothing does."""
+    if is_met:
+        rays_left = min(rays_left, SPECKLE_SHARE * samples.rays)
     wanting, _ = next_pass(due, samples.taken, MOST_RAYS, samples.cost, np.inf)
     active, further = next_pass(due, samples.taken, MOST_RAYS, samples.cost, min(rays_left, rays_in_time))
     if len(wanting) and len(active) >= ENOUGH * len(wanting):
         return active, further, None
+    if is_met:
+        return active, further, ""
     if not len(wanting):
         return active, further, "as receivers have the most rays that they may"
     return active, further, "by the time limit" if rays_in_time < rays_left else "by the budget of rays"

@@ -1,4 +1,4 @@
-"""Passes of a gather: how many rays they begin with, may take, and what ends them."""
+"""Passes of a gather: how many rays they begin with, may take, and what the last ones are for."""
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from addon.core.passes import (
     LEAST_FIRST,
     MOST_FIRST,
     MOST_RAYS,
+    SPECKLE_SHARE,
     _due,
     _Found,
     _next,
@@ -51,7 +52,17 @@ def next_of(noise, error_found, rays_left=1e12, rays_in_time=np.inf, aim=AIM, ta
     """What comes after it for a target of 0.02: samples so far, receivers, further rays, what stops it."""
     found, samples, probes = after_a_pass(noise, error_found, taken)
     due = _due(found, samples, probes, 0.02, aim)
-    return samples, *_next(due, samples, rays_left, rays_in_time)
+    return samples, *_next(due, samples, error_found <= 0.02, rays_left, rays_in_time)
+
+
+SPECKLED = np.where(np.arange(COUNT) % 32 == 0, 0.5, 0.001)
+
+
+def test_a_target_that_is_met_leaves_speckles_an_eighth_of_the_rays_at_the_most():
+    samples, active, further, stopped = next_of(SPECKLED, 0.01)
+    assert stopped is None
+    assert set(active) <= set(np.flatnonzero(SPECKLED > 0.1))
+    assert 0 < samples.cost * further[active].sum() <= SPECKLE_SHARE * samples.rays
 
 
 def test_a_target_missed_by_a_hair_is_gone_on_for():
@@ -65,6 +76,11 @@ def test_who_can_wait_for_a_denoiser_takes_fewer_rays():
     noise = np.linspace(0.01, 0.06, COUNT)
     alone, denoised = (next_of(noise, 0.035, aim=aim)[2].sum() for aim in (AIM, DENOISED_AIM))
     assert denoised < alone
+
+
+def test_a_target_that_is_met_is_stopped_by_nothing():
+    for noise, rays_left in ((np.full(COUNT, 0.001), 1e12), (np.full(COUNT, 0.5), 0)):
+        assert next_of(noise, 0.01, rays_left)[3] == ""
 
 
 def test_a_target_that_is_missed_names_what_ran_out():
@@ -84,7 +100,7 @@ def test_a_pass_that_few_of_those_that_want_it_can_be_given_is_not_worth_it():
     for share, expected in ((ENOUGH / 2, "by the budget of rays"), (2 * ENOUGH, None)):
         loud = np.arange(COUNT) < share * COUNT
         rays_left = REPLICATES * 16 * loud.sum()
-        active, further, stopped = _next(np.where(loud, 40.0, 12.0), samples, rays_left, np.inf)
+        active, further, stopped = _next(np.where(loud, 40.0, 12.0), samples, False, rays_left, np.inf)
         assert set(active) == set(np.flatnonzero(loud))
         assert samples.cost * further[active].sum() <= rays_left
         assert stopped == expected
