@@ -134,9 +134,8 @@ def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed, on_st
     cells = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
     no_light = np.zeros((len(direct), 3), np.float32)
     job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, cells, no_light, reach))
-    job, rays = job.seeing(grid, direct, look), 0
+    job, rays, share = job.seeing(grid, direct, look), 0, 1 / (LOOKS - 1)
     for again in range(1, LOOKS):
-        share = 1 / (LOOKS - 1)
         look, traced = job.glimpse(TEXEL_LOOK_RAYS, seed + 1000 * again, within(on_step, (again - 1) * share, share))
         job = job.seeing(grid, direct, blurred(job.kernel.workers, grid, job.receivers, look))
         rays += traced

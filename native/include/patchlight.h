@@ -260,8 +260,7 @@ typedef struct pl_texel_light {
     float reach;
 } pl_texel_light;
 
-/* What gather rays travel through, and what they see there; `lights` as in pl_direct, for mixed sides and where rays go
- * on. */
+/* What gather rays travel through and see; `lights` as in pl_direct, for mixed sides and where rays go on. */
 typedef struct pl_gather_scene {
     const pl_scene *scene;
     const pl_patches *patches;
