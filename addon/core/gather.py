@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -83,6 +84,7 @@ def gather_irradiance(
     if not len(receivers):
         nothing = {"direct": 0, "gather": 0, "probe": 0}
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
+    started = time.perf_counter()
     weights = grid.shown if grid else np.ones(len(receivers), np.float32)
     job = GatherJob(kernel, solved, receivers, weights, no_guides(len(receivers)))
     direct, shadow_rays, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.35))
@@ -90,9 +92,10 @@ def gather_irradiance(
         job, further = _with_texel_light(job, grid, direct, look, seed + 2, within(on_step, 0.35, 0.05))
         looks += further
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
-    gathered = gather_until(
-        replace(job, guides=guides), grid, direct, denoise, error, seed, seconds_left, within(on_step, 0.4, 0.6)
-    )
+    job = replace(job, guides=guides)
+    pace = (shadow_rays + looks + learning) / (time.perf_counter() - started)
+    passes = within(on_step, 0.4, 0.6)
+    gathered = gather_until(job, grid, direct, denoise, error, seed, pace, seconds_left, passes)
     at_points = measure(gathered.job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
     # relative to what is there, not to what is shown: light that leaks into the dark has to count as all wrong
     scale = scale_of_luminance(at_points.luminance)

@@ -20,6 +20,7 @@ from .workers import within
 LEAST_FIRST, MOST_FIRST = 2, 8  # rays of a replicate in the first pass; few may miss what is bright and small, and
 MANY_TEXELS = 1 << 16  # not know it, but of so many texels neighbours vouch for each other: others begin with the most
 FIRST_ERROR = 0.07  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
+HURRY = 4  # such passes could be had in the time there is, at the least: else all begin with the fewest
 MOST_RAYS = 2048  # of a replicate; a last few that are not WORTH a pass are not taken
 MOST_COST = 15  # times what the fewest first rays cost may all passes, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
@@ -97,7 +98,7 @@ class _Found:
 
 
 def gather_until(
-    job: GatherJob, grid: TexelGrid | None, direct, denoise: Callable | None, error, seed, seconds_left, on_step
+    job: GatherJob, grid: TexelGrid | None, direct, denoise: Callable | None, error, seed, pace, seconds_left, on_step
 ) -> Gathered:
     """Gather until the error is the target, or further rays no longer help or cannot be afforded.
 
@@ -105,15 +106,15 @@ def gather_until(
     ----------
     grid, denoise, error, seconds_left : as in gather.gather_irradiance
     direct : float32 (N, 3) direct light at the job's receivers
+    pace : rays that were traced in a second before
     """
     count, started = len(job.receivers), time.perf_counter()
     samples, probes = _Samples(count), None
     fewest = LEAST_FIRST if grid and count >= MANY_TEXELS else MOST_FIRST
-    # in a hurry as few as may be: whoever is not done gets more
-    first = first_rays(fewest, error) if seconds_left() == np.inf else fewest
+    first = first_rays(fewest, error, pace * seconds_left() / (REPLICATES * count))
     active, further = np.arange(count), np.full(count, first)
     aim = AIM if denoise is None or grid is None else DENOISED_AIM
-    budget, idle, met, begin, rms = 0, 0, None, 0.0, np.inf
+    budget, idle, begin, rms, is_after_speckles = 0, 0, 0.0, np.inf, False
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
@@ -140,19 +141,19 @@ def gather_until(
         active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
         if idle == MOST_IDLE:
             stopped = "as further rays no longer help"
-        if met:
-            # speckles had their pass; if the error is over the target again, that is chance
-            found, stopped = found if rms <= error else met, ""
-        met = found if rms <= error else None
+        if rms <= error and is_after_speckles:
+            stopped = ""
+        is_after_speckles |= rms <= error
         if stopped is not None:
             found = found if is_asked else _denoised(denoise, grid, found, gathered, direct, probes)
             traced = samples.rays, probes.measured.rays
             return Gathered(job, found.values, found.rms, stopped, found.is_denoised, *traced)
 
 
-def first_rays(fewest, error) -> int:
-    """Rays of a replicate that all receivers start with."""
-    return int(np.clip(2.0 ** round(np.log2(FIRST_ERROR / error)), fewest, MOST_FIRST))
+def first_rays(fewest, error, in_time) -> int:
+    """Rays of a replicate that all receivers start with, where there is time for ``in_time``."""
+    enough = int(np.clip(2.0 ** round(np.log2(FIRST_ERROR / error)), fewest, MOST_FIRST))
+    return enough if HURRY * enough <= in_time else fewest
 
 
 def ray_budget(fewest_cost, error) -> int:

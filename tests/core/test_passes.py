@@ -9,6 +9,7 @@ from addon.core.passes import (
     DENOISED_AIM,
     ENOUGH,
     FREE_RAYS,
+    HURRY,
     LEAST_FIRST,
     MOST_FIRST,
     MOST_RAYS,
@@ -27,8 +28,14 @@ COUNT = 4096
 
 def test_the_smaller_the_error_the_more_rays_the_first_pass_takes_and_never_fewer_than_the_fewest():
     errors = [1.0, 0.05, 0.02, 0.01, 1e-4]
-    assert [first_rays(LEAST_FIRST, error) for error in errors] == [2, 2, 4, 8, 8]
-    assert [first_rays(MOST_FIRST, error) for error in errors] == [8, 8, 8, 8, 8]
+    assert [first_rays(LEAST_FIRST, error, np.inf) for error in errors] == [2, 2, 4, 8, 8]
+    assert [first_rays(MOST_FIRST, error, np.inf) for error in errors] == [8, 8, 8, 8, 8]
+
+
+def test_a_time_limit_makes_the_first_pass_shorter_only_where_it_is_near():
+    ample = HURRY * first_rays(LEAST_FIRST, 0.01, np.inf)
+    assert first_rays(LEAST_FIRST, 0.01, ample) == first_rays(LEAST_FIRST, 0.01, np.inf) > LEAST_FIRST
+    assert first_rays(LEAST_FIRST, 0.01, 0.9 * ample) == LEAST_FIRST
 
 
 def test_a_budget_goes_by_the_square_of_a_small_error_and_has_a_least():
