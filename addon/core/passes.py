@@ -19,7 +19,7 @@ from .workers import within
 
 LEAST_FIRST, MOST_FIRST = 2, 8  # rays of a replicate in the first pass; few may miss what is bright and small, and
 MANY_TEXELS = 1 << 16  # not know it, but of so many texels neighbours vouch for each other: others begin with the most
-FIRST_ERROR = 0.07  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
+FIRST_ERROR = 0.1  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
 HURRY = 4  # such passes could be had in the time there is, at the least: else all begin with the fewest
 MOST_RAYS = 2048  # of a replicate; a last few that are not WORTH a pass are not taken
 MOST_COST = 15  # times what the fewest first rays cost may all passes, and FREE_RAYS at least,
@@ -30,8 +30,8 @@ MOST_IDLE = 2  # the noise
 AIM, DENOISED_AIM = 0.95, 1.05  # of the target: what receivers are due is an estimate, and a denoiser takes off some
 STEP = 0.85  # of the error there is, at the most, is aimed at: who is due hardly more than it has gets nothing
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
-SPECKLE = 2.0  # times the target: receivers that noisy are seen when it is met; then they get GROWTH times more,
-SPECKLE_SHARE = 1 / 8  # once, and of all no more than so many of those traced
+SPECKLE = 2.0  # times the target: receivers that noisy are seen when the first pass meets it; then they get GROWTH
+SPECKLE_SHARE = 1 / 8  # times more, and of all no more than so many of those traced. Other passes are for these, too
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 
 
@@ -114,7 +114,7 @@ def gather_until(
     first = first_rays(fewest, error, pace * seconds_left() / (REPLICATES * count))
     active, further = np.arange(count), np.full(count, first)
     aim = AIM if denoise is None or grid is None else DENOISED_AIM
-    budget, idle, begin, rms, is_after_speckles = 0, 0, 0.0, np.inf, False
+    budget, idle, begin, rms, is_first = 0, 0, 0.0, np.inf, True
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
@@ -141,9 +141,9 @@ def gather_until(
         active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
         if idle == MOST_IDLE:
             stopped = "as further rays no longer help"
-        if rms <= error and is_after_speckles:
+        if rms <= error and not is_first:
             stopped = ""
-        is_after_speckles |= rms <= error
+        is_first = False
         if stopped is not None:
             found = found if is_asked else _denoised(denoise, grid, found, gathered, direct, probes)
             traced = samples.rays, probes.measured.rays
