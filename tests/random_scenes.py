@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import strategies as st
 
+from addon.core.environment import Environment
 from addon.core.scene import AreaLight, Material, PointLight, Scene, SceneObject, SunLight, Texture
 
 # lengths at which something breaks: denormal, lost in float32, a hair, a room, a planet, lost in float64, none at all
@@ -98,6 +99,15 @@ def textures(draw):
 
 
 @st.composite
+def environments(draw):
+    """Dark but for one pixel, or even: no brighter than the world's radiance may be."""
+    height, width = draw(st.sampled_from(((1, 1), (1, 3), (4, 8), (64, 128))))
+    pixels = np.full((height, width, 3), draw(st.sampled_from((0.0, 1e-30, 1e-6, 1.0))), np.float32)
+    pixels[draw(st.integers(0, height - 1)), draw(st.integers(0, width - 1))] = draw(st.sampled_from((0.0, 1.0)))
+    return Environment("sky", pixels, np.roll(np.eye(3), draw(st.integers(0, 2)), axis=0))
+
+
+@st.composite
 def materials(draw):
     """Transmittance and glow are rare, so that most scenes have surfaces to light."""
     clear = draw(st.sampled_from(((0.0, 0.0, 0.0),) * 4 + ((1.0, 1.0, 1.0), (0.5, 0.0, 0.0))))
@@ -155,6 +165,7 @@ def scenes(draw):
         materials=tuple(draw(materials()) for _ in parts),
         lights=tuple(draw(lights)),
         world_radiance=draw(st.just((0.0, 0.0, 0.0)) | brightness),
+        environment=draw(st.none() | st.none() | environments()),
     )
 
 

@@ -13,7 +13,8 @@ ADDON = ROOT / "addon"
 MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "core": {"core"}}
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
-    *("ranges", "settings", "scene", "sound_faces", "textures", "emitters", "relative", "z_order"),
+    *("ranges", "settings", "environment", "scene", "sound_faces", "textures", "emitters", "sky"),
+    *("relative", "z_order"),
     *("report", "workers", "kernel", "patches", "parted"),
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
     *("transport", "aimed", "hemicube", "sampled", "estimators", "exchange", "solver", "dense"),

@@ -52,13 +52,6 @@ def mean_colour(pixels) -> tuple[float, float, float]:
     return tuple(float(c) for c in pixels.mean(axis=(0, 1), dtype=np.float64))
 
 
-def equirectangular_mean(pixels) -> tuple[float, float, float]:
-    """Mean over the sphere of directions: rows near the poles cover less of it."""
-    latitude = (np.arange(len(pixels)) + 0.5) / len(pixels) * np.pi - np.pi / 2
-    rows = pixels.mean(axis=1, dtype=np.float64)
-    return tuple(float(c) for c in np.average(rows, axis=0, weights=np.cos(latitude)))
-
-
 def _rgb(pixels):
     channels = pixels.shape[2]
     return pixels[..., :3] if channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)

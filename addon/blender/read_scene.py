@@ -96,7 +96,7 @@ class SceneReading:
     def scene(self, world) -> Scene:
         """All that was read, as one core Scene."""
         lights = read_lights(self.depsgraph, self.visibility, self.warn)
-        world_radiance = read_world(world, self.depsgraph, self.warn)
+        world_radiance, environment = read_world(world, self.depsgraph, self.warn)
         first_vertices = np.cumsum([0] + [len(p.vertices) for p in self.placed])
         triangles = [p.triangles + first for p, first in zip(self.placed, first_vertices)]
         return Scene(
@@ -109,6 +109,7 @@ class SceneReading:
             materials=tuple(self.materials.entries),
             lights=lights,
             world_radiance=world_radiance,
+            environment=environment,
             warnings=self.warn.all(),
         )
 

@@ -1,46 +1,74 @@
-"""The world -> one constant radiance: L = colour x strength; an image is averaged over the sphere."""
+"""The world -> its radiance, L = colour x strength, and the environment image that this multiplies."""
 
 from __future__ import annotations
 
 import numpy as np
+from mathutils import Euler
 
-from .read_images import equirectangular_mean, linear_pixels, mean_colour
-from .shader_nodes import Unreadable, constant, surface_shader
+from ..core.environment import UNTURNED, Environment
+from .read_images import linear_pixels, mean_colour
+from .shader_nodes import Unreadable, constant, constant_vector, surface_shader
 
 BLACK = (0.0, 0.0, 0.0)
+WHITE = (1.0, 1.0, 1.0)
 
 
-def read_world(world, depsgraph, warn) -> tuple[float, float, float]:
-    """L of the world [W/(m^2 sr)]; no world is black."""
+def read_world(world, depsgraph, warn) -> tuple[tuple[float, float, float], Environment | None]:
+    """L of the world [W/(m^2 sr)], and the image that it multiplies or None; no world is black."""
     if world is None:
-        return BLACK
+        return BLACK, None
     world = world.evaluated_get(depsgraph)
     if not world.use_nodes or world.node_tree is None:
-        return _radiance(world.color, 1.0)
+        return _radiance(world.color, 1.0), None
     shader = surface_shader(world.node_tree, "OUTPUT_WORLD")
     if shader is None:
-        return BLACK
+        return BLACK, None
     try:
         if shader.node.type not in {"BACKGROUND", "EMISSION"}:
             raise Unreadable(f"{shader.node.bl_label} node")
         strength = constant(shader.feeding("Strength"))
-        return BLACK if strength == 0 else _radiance(_colour(shader.feeding("Color"), world, warn), strength)
+        if strength <= 0:
+            return BLACK, None
+        colour, environment = _colour(shader.feeding("Color"), world, warn)
+        return _radiance(colour, strength), environment
     except Unreadable as error:
         warn(f"world '{world.name}': its {error} cannot be read: its viewport colour is used")
-        return _radiance(world.color, 1.0)
+        return _radiance(world.color, 1.0), None
 
 
 def _colour(reached, world, warn):
+    """A colour, and the environment that it multiplies or None."""
     if reached.is_constant:
-        return reached.socket.default_value
+        return reached.socket.default_value, None
     if reached.node.type == "RGB":
-        return reached.node.outputs[0].default_value
-    if reached.node.type not in {"TEX_ENVIRONMENT", "TEX_IMAGE"} or reached.node.image is None:
+        return reached.node.outputs[0].default_value, None
+    image = getattr(reached.node, "image", None)
+    if reached.node.type not in {"TEX_ENVIRONMENT", "TEX_IMAGE"} or image is None:
         raise Unreadable(f"{reached.node.bl_label} node")
-    pixels = linear_pixels(reached.node.image, warn)
-    warn(f"world '{world.name}': its image '{reached.node.image.name}' is averaged to one colour")
-    is_equirectangular = getattr(reached.node, "projection", "") == "EQUIRECTANGULAR"
-    return equirectangular_mean(pixels) if is_equirectangular else mean_colour(pixels)
+    pixels = linear_pixels(image, warn)
+    if reached.node.type == "TEX_IMAGE" or reached.node.projection != "EQUIRECTANGULAR":
+        warn(f"world '{world.name}': its image '{image.name}' is not equirectangular: it is averaged to one colour")
+        return mean_colour(pixels), None
+    return WHITE, Environment(image.name, pixels, _turn(reached.feeding("Vector")))
+
+
+def _turn(vector):
+    """The matrix (3, 3) from directions of the world to those that are looked up; Unreadable where it is none."""
+    if vector.is_constant or (vector.node.type == "TEX_COORD" and vector.socket.identifier == "Generated"):
+        return UNTURNED
+    if vector.node.type != "MAPPING":
+        raise Unreadable(f"{vector.node.bl_label} coordinates")
+    if vector.feeding("Vector").is_constant:
+        raise Unreadable("Mapping node without coordinates")
+    inner = np.array(_turn(vector.feeding("Vector")))
+    if vector.node.vector_type not in {"POINT", "VECTOR", "TEXTURE"}:
+        raise Unreadable(f"Mapping node of type {vector.node.vector_type.title()}")
+    location, rotation, scale = (constant_vector(vector, name) for name in ("Location", "Rotation", "Scale"))
+    if np.abs(location).max() > 0 or np.ptp(np.abs(scale)) > 1e-4 * np.abs(scale).max() or np.min(np.abs(scale)) == 0:
+        raise Unreadable("Mapping node that does more than turn")
+    turn, flips = np.array(Euler(rotation).to_matrix(), np.float64), np.diag(np.sign(scale))
+    own = flips @ turn.T if vector.node.vector_type == "TEXTURE" else turn @ flips
+    return tuple(map(tuple, own @ inner))
 
 
 def _radiance(colour, strength):

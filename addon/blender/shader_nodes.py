@@ -69,6 +69,16 @@ def constant(reached: Reached) -> float:
     raise Unreadable(f"{reached.socket.node.bl_label} node")
 
 
+def constant_vector(mapping: Reached, name) -> tuple[float, float, float]:
+    """An input of a Mapping node that does not vary."""
+    if name not in mapping.node.inputs:  # a Vector mapping has no location
+        return (0.0, 0.0, 0.0)
+    reached = mapping.feeding(name)
+    if not reached.is_constant:
+        raise Unreadable(f"Mapping node whose {name} is linked")
+    return tuple(reached.socket.default_value)
+
+
 def _live_link(socket):
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 

@@ -7,7 +7,7 @@ from math import cos, sin
 
 import numpy as np
 
-from .shader_nodes import Reached, Unreadable
+from .shader_nodes import Reached, Unreadable, constant_vector
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
@@ -46,7 +46,7 @@ def read_coordinates(vector: Reached) -> Coordinates:
 
 def _mapping_affine(mapping: Reached):
     node = mapping.node
-    location, rotation, scale = (_constant_vector(mapping, name) for name in ("Location", "Rotation", "Scale"))
+    location, rotation, scale = (constant_vector(mapping, name) for name in ("Location", "Rotation", "Scale"))
     if abs(rotation[0]) > 1e-6 or abs(rotation[1]) > 1e-6:
         raise Unreadable("Mapping node that turns out of the UV plane")
     turn = np.array([[cos(rotation[2]), -sin(rotation[2])], [sin(rotation[2]), cos(rotation[2])]])
@@ -59,15 +59,6 @@ def _mapping_affine(mapping: Reached):
         raise Unreadable(f"Mapping node of type {node.vector_type.title()}")
     shift = location[:2] if node.vector_type == "POINT" else (0.0, 0.0)
     return np.column_stack([turn @ np.diag(scale[:2]), shift])
-
-
-def _constant_vector(mapping, name):
-    if name not in mapping.node.inputs:  # a Vector mapping has no location
-        return (0.0, 0.0, 0.0)
-    reached = mapping.feeding(name)
-    if not reached.is_constant:
-        raise Unreadable(f"Mapping node whose {name} is linked")
-    return tuple(reached.socket.default_value)
 
 
 def _after(outer, inner):

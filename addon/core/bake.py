@@ -18,6 +18,7 @@ from .receivers import surface_receivers, vertex_receivers
 from .report import Report
 from .scene import Scene, SceneError, radiance_from_exitance
 from .settings import BakeSettings
+from .sky import with_suns
 from .smoothing import texel_grid
 from .sound_faces import SoundFaces, sound_faces
 from .texels import texels
@@ -56,7 +57,7 @@ def bake(
     """
     sound = sound_faces(scene)
     _require_targets(sound)
-    scene = sound.scene
+    scene = with_suns(sound.scene)
     progress = Progress(on_progress, STAGE_SHARES)
     with (
         Workers(settings.thread_count) as workers,

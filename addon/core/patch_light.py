@@ -85,7 +85,7 @@ def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, sample
 
 
 def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, count, seed):
-    """Mean irradiance of every side from the constant world, float64 (2 P, 3), and the rays it took.
+    """Mean irradiance of every side from the world, float64 (2 P, 3), and the rays it took.
 
     The sky is gathered with all surfaces black.
     """

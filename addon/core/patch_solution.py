@@ -34,7 +34,7 @@ class PatchSolution:
     kinds : uint8 (2 P,) EVEN, MIXED (lights reach one part of the side only) or LIGHT (receivers sample it as a light)
     reaches : float32 (2 P,) rays that hit from nearer do not take the side's mean [m]; inf in narrow gaps, and
         where something parts them in two
-    sky : float32 (1, 3) pi times the world's radiance [W/m^2]
+    sky : float32 (n^2, 3) pi times the world's radiance, by direction [W/m^2] (sky.sky_map)
     """
 
     radiosity: np.ndarray

@@ -18,8 +18,9 @@ from .patch_light import QUICK_ERROR, PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
 from .patches import cut, grid_of, patch_size_for, subdivide, triangle_areas
 from .progressive import solve_progressive
-from .scene import Scene, exitance_from_radiance
+from .scene import Scene
 from .settings import BakeSettings
+from .sky import sky_map
 from .solver import Solution
 from .stochastic import solve_stochastic
 from .transport import form_factors
@@ -80,7 +81,7 @@ def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, setti
 def _solved(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, error, on_step) -> Solved:
     """The same with patches that are good to about an error."""
     solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene))
-    sky = np.asarray(exitance_from_radiance(scene.world_radiance), np.float32).reshape(1, 3)
+    sky = sky_map(scene)
 
     def measure(patches, on_step, known=None):
         return measure_patches(scene, kernel, patches, emitters, sky, error, settings.seed, known, on_step)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .environment import Environment
 from .ranges import (
     BRIGHTEST,
     LARGEST_COORDINATE,
@@ -213,7 +214,8 @@ class Scene:
     objects : runs of triangles, in order, without gaps
     materials : tuple of Material
     lights : tuple of PointLight, AreaLight, SunLight
-    world_radiance : (3,) L of the constant world [W/(m^2 sr)]
+    world_radiance : (3,) L of the world [W/(m^2 sr)], the same all round; multiplies the environment where there is one
+    environment : Environment or None
     warnings : one sentence each, naming the object or material
     """
 
@@ -226,6 +228,7 @@ class Scene:
     materials: tuple[Material, ...]
     lights: tuple = ()
     world_radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    environment: Environment | None = None
     warnings: tuple[str, ...] = field(default=())
 
     def __post_init__(self):
@@ -238,6 +241,9 @@ class Scene:
         _require_index("triangles", self.triangles, "vertex", len(self.vertices))
         _require_index("triangle_materials", self.triangle_materials, "material", len(self.materials))
         require_colour("the world", "radiance", self.world_radiance, BRIGHTEST)
+        if self.environment is not None:
+            brightest = np.array(self.world_radiance, np.float64) * self.environment.pixels.max(axis=(0, 1))
+            require_colour("the world", "radiance times its environment", brightest, BRIGHTEST)
         expected = 0
         for obj in self.objects:
             if obj.first != expected:

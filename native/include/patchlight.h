@@ -222,7 +222,10 @@ void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
  *   reaches      2 * patch_count: a ray that hits a side from nearer than this [m] does not take its mean
  *                but goes on from the point hit, as the patch may lie half under something; INFINITY for a
  *                side in a gap narrower than its patch, or parted by something, where no mean can stand for the light
- *   sky          pi * the radiance of what rays see that leave the scene
+ *   sky          3 * sky_side^2: pi * the radiance of what rays see that leave the scene, by direction: over an
+ *                octahedron laid out flat (Engelhardt & Dachsbacher 2008), texel (column, row) at u = column + 0.5,
+ *                v = row + 0.5 over the side, (2 u - 1, 2 v - 1) = (x, y) / (|x| + |y| + |z|), where z < 0 folded out:
+ *                (1 - |y|, 1 - |x|) with the signs of (x, y). A side of 1: the same all round
  */
 typedef enum pl_side_kind {
     PL_SIDE_EVEN = 0,  /* one radiosity stands for it */
@@ -235,7 +238,8 @@ typedef struct pl_solution {
     const float *reflectance;
     const uint8_t *kinds;
     const float *reaches;
-    float sky[3];
+    const float *sky;
+    size_t sky_side;
 } pl_solution;
 
 /*

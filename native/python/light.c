@@ -4,6 +4,8 @@
  */
 #include "door.h"
 
+#include <math.h>
+
 /* The five arrays of a light table, as every function that samples lights takes them. */
 #define LIGHT_ARRAYS(at)                                                                                               \
     {"light_kinds", 'i', 1, -1, false, {0}},                                                                           \
@@ -51,14 +53,19 @@ enum {
 #define GATHER_ARRAYS(sides)                                                                                           \
     {"radiosity", 'f', 3, sides, false, {0}}, {"direct", 'f', 3, sides, false, {0}},                                   \
         {"reflectance", 'f', 3, (sides) / 2, false, {0}}, {"kinds", 'B', 1, sides, false, {0}},                        \
-        {"reaches", 'f', 1, sides, false, {0}}, {"sky", 'f', 3, 1, false, {0}}, {"texel_uvs", 'f', 6, -1, false, {0}}, \
-        {"texel_receivers", 'i', 1, -1, false, {0}}, {"texel_radiosity", 'f', 3, -1, false, {0}},                      \
-        LIGHT_ARRAYS(LIGHTS_AT), RECEIVER_ARRAYS(RECEIVERS_AT)
+        {"reaches", 'f', 1, sides, false, {0}}, {"sky", 'f', 3, -1, false, {0}},                                       \
+        {"texel_uvs", 'f', 6, -1, false, {0}}, {"texel_receivers", 'i', 1, -1, false, {0}},                            \
+        {"texel_radiosity", 'f', 3, -1, false, {0}}, LIGHT_ARRAYS(LIGHTS_AT), RECEIVER_ARRAYS(RECEIVERS_AT)
 
 static pl_solution solution_of(const door_array *arrays) {
-    const float *sky = arrays[5].view.buf;
-    return (pl_solution){arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf,
-                         arrays[3].view.buf, arrays[4].view.buf, {sky[0], sky[1], sky[2]}};
+    const size_t texels = door_rows(&arrays[5]), side = (size_t)(sqrt((double)texels) + 0.5);
+    return (pl_solution){arrays[0].view.buf,
+                         arrays[1].view.buf,
+                         arrays[2].view.buf,
+                         arrays[3].view.buf,
+                         arrays[4].view.buf,
+                         arrays[5].view.buf,
+                         side * side == texels ? side : 0};
 }
 
 /* `width` 0: no texel has a light of its own yet. */

@@ -9,6 +9,7 @@
 #include "direct.h"
 #include "guide.h"
 #include "patches.h"
+#include "sky.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -101,7 +102,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         if (job->scene->clear.bvh)
             transmit(job->scene, origin, direction, hit.distance, weight);
         if (hit.triangle < 0) {
-            add(io_sum, solution->sky, weight);
+            add(io_sum, sky_seen(solution->sky, solution->sky_side, direction), weight);
             return;
         }
         const bool is_back = step == 0 ? sees_back(frame, direction, &hit) : hit.is_back;
@@ -163,7 +164,7 @@ static pl_status begin(gather_job *job, const pl_gather_scene *in, const pl_rece
             return PL_ERR_ARGUMENT;
     if (in->texels && in->texels->triangle_count != in->scene->triangle_count)
         return PL_ERR_ARGUMENT;
-    if (!lights_are_valid(in->lights) || !pl_patches_fit(in->patches, in->scene))
+    if (!lights_are_valid(in->lights) || !pl_patches_fit(in->patches, in->scene) || in->solution->sky_side < 1)
         return PL_ERR_ARGUMENT;
     *job = (gather_job){.scene = in->scene,
                         .patches = in->patches,

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from addon.blender.read_scene import read_scene
+from addon.core.bake import bake
 from addon.core.scene import AreaLight, PointLight, SunLight
+from addon.core.settings import BakeSettings
 
 pytestmark = pytest.mark.usefixtures("empty_file")
 
@@ -173,18 +175,107 @@ def test_the_world_is_colour_times_strength(set_world, read):
     np.testing.assert_allclose(read()[1].world_radiance, np.array(COLOUR) * 4)
 
 
-def test_a_sky_image_is_averaged_over_the_sphere_and_named(set_world, read, add_image):
-    """The upper cap z > sin(45 deg) is bright: it covers (1 - sin 45) / 2 of the sphere, but a quarter of the rows."""
-    tree, background = set_world(strength=2.0)
-    pixels = np.zeros((400, 8, 3), np.float32)
-    pixels[300:] = COLOUR
-    node = tree.nodes.new("ShaderNodeTexEnvironment")
-    node.image = add_image(pixels, "Sunset", is_float=True, space="Non-Color")
-    tree.links.new(node.outputs[0], background.inputs["Color"])
+@pytest.fixture
+def sky_image(set_world, add_image):
+    """Give the scene a world of an image of 32 x 64 pixels, and return (its pixels, node tree, its node)."""
+
+    def make(strength=2.0):
+        tree, background = set_world(strength=strength)
+        pixels = np.random.default_rng(0).uniform(0, 1, (32, 64, 3)).astype(np.float32)
+        pixels[24:28, 8:16] = 20.0
+        node = tree.nodes.new("ShaderNodeTexEnvironment")
+        node.image = add_image(pixels, "Sunset", is_float=True, space="Non-Color")
+        tree.links.new(node.outputs[0], background.inputs["Color"])
+        return pixels, tree, node
+
+    return make
+
+
+def turned(tree, node, coordinates="Generated", **inputs):
+    """Link a Mapping node between the coordinates and the image."""
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    mapping.vector_type = inputs.pop("kind", "POINT")
+    for name, value in inputs.items():
+        mapping.inputs[name].default_value = value
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs[coordinates], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], node.inputs["Vector"])
+
+
+def test_a_sky_image_is_an_environment(sky_image, read):
+    pixels, _, _ = sky_image()
     _, scene = read()
-    share = (1 - sin(pi / 4)) / 2
-    np.testing.assert_allclose(scene.world_radiance, 2 * share * np.array(COLOUR), rtol=1e-4)  # midpoint rule, 400 rows
+    assert scene.world_radiance == (2, 2, 2)
+    assert scene.environment.name == "Sunset"
+    np.testing.assert_array_equal(scene.environment.pixels, pixels)
+    np.testing.assert_array_equal(scene.environment.to_image, np.eye(3))
+    assert not scene.warnings
+
+
+def test_a_mapping_turns_the_sky(sky_image, read):
+    """A quarter turn about Z takes +X to +Y; a texture that is turned is looked up the other way round."""
+    _, tree, node = sky_image()
+    quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    turned(tree, node, Rotation=(0, 0, pi / 2))
+    np.testing.assert_allclose(read()[1].environment.to_image, quarter, atol=FLOAT32)
+    turned(tree, node, kind="TEXTURE", Rotation=(0, 0, pi / 2), Scale=(-3, 3, 3))
+    np.testing.assert_allclose(read()[1].environment.to_image, np.diag([-1, 1, 1]) @ quarter.T, atol=FLOAT32)
+
+
+@pytest.mark.parametrize(
+    "how", [{"Location": (0, 0, 1)}, {"Scale": (1, 1, 2)}, {"coordinates": "Camera"}, {"kind": "NORMAL"}]
+)
+def test_a_sky_that_is_more_than_turned_is_named(sky_image, read, how):
+    _, tree, node = sky_image()
+    turned(tree, node, **how)
+    bpy.context.scene.world.color = COLOUR
+    _, scene = read()
+    assert scene.environment is None
+    np.testing.assert_allclose(scene.world_radiance, COLOUR)
+    assert any("'Sky'" in warning for warning in scene.warnings)
+
+
+def test_an_image_that_is_no_panorama_is_averaged_and_named(sky_image, read):
+    pixels, _, node = sky_image()
+    node.projection = "MIRROR_BALL"
+    _, scene = read()
+    assert scene.environment is None
+    np.testing.assert_allclose(scene.world_radiance, 2 * pixels.mean(axis=(0, 1)), rtol=1e-5)
     assert any("'Sky'" in warning and "'Sunset'" in warning for warning in scene.warnings)
+
+
+def test_a_cube_under_a_turned_sky_has_the_light_that_cycles_gives_it(sky_image, add_cube):
+    _, tree, node = sky_image()
+    turned(tree, node, kind="TEXTURE", Rotation=(0.3, -0.6, 1.2), Scale=(1, -1, 1))
+    cube = add_cube()
+    light = {}
+    for name, bake_it in (("cycles", cycles_light), ("ours", our_light)):
+        light[name] = bake_it(cube)
+    # Cycles' 1024 samples and our error of 0.01, over the 24 corners of each; no two faces are alike to a third
+    np.testing.assert_allclose(light["ours"], light["cycles"], rtol=0.03)
+
+
+def cycles_light(obj):
+    """E / pi on the six faces, by Cycles: (6, 3)."""
+    scene, mesh = bpy.context.scene, obj.data
+    if not mesh.materials:
+        mesh.materials.append(bpy.data.materials.new("grey"))
+        mesh.materials[0].use_nodes = True
+    mesh.color_attributes.active_color = mesh.color_attributes.new("light", "FLOAT_COLOR", "CORNER")
+    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 1024, False
+    bpy.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, target="VERTEX_COLORS")
+    colours = np.empty(len(mesh.loops) * 4, np.float32)
+    mesh.color_attributes["light"].data.foreach_get("color", colours)
+    return np.array([colours.reshape(-1, 4)[list(face.loop_indices), :3].mean(axis=0) for face in mesh.polygons])
+
+
+def our_light(obj):
+    """The same by the bake."""
+    scene = read_scene(bpy.context.scene)
+    colours = bake(scene, BakeSettings(target="vertex", error=0.01)).corner_colours
+    faces = scene.objects[0].polygons
+    return np.array([colours[faces == face].mean(axis=(0, 1)) for face in range(len(obj.data.polygons))])
 
 
 def test_an_unreadable_sky_is_never_silently_black(set_world, read):

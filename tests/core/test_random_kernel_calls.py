@@ -240,7 +240,7 @@ def test_gathered_light_of_any_solution(data):
         np.full((count, 3), data.draw(st.sampled_from((0.0, 0.7, 1.0))), np.float32),
         arrays(data.draw, 2 * count, np.uint8, st.sampled_from((0, 1, 2))),
         arrays(data.draw, 2 * count, np.float32, st.sampled_from((0.0, 1.0, np.inf))),
-        arrays(data.draw, (1, 3), np.float32, values),
+        arrays(data.draw, (data.draw(st.sampled_from((0, 1, 1, 4, 5))), 3), np.float32, values),
     )
     many = data.draw(counts)
     where = receivers(data.draw, 2 * kernel[2], many)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from addon.core.environment import Environment
 from addon.core.scene import (
     Material,
     PointLight,
@@ -72,6 +73,8 @@ NUMBERS_OUT_OF_RANGE = [
     (Texture, {"pixels": np.full((1, 1, 3), np.nan, np.float32)}, "image it: 1 pixels"),
     (Texture, {"pixels": np.zeros((0, 1, 3), np.float32)}, "image it: expected"),
     (Texture, {"pixels": np.zeros((1, 1, 3))}, "image it: expected"),
+    (Environment, {"pixels": np.full((1, 2, 3), -1.0, np.float32)}, "environment it: 2 pixels"),
+    (Environment, {"pixels": np.ones((1, 2, 3), np.float32), "to_image": 2 * np.eye(3)}, "it: to_image is not a rot"),
 ]
 
 
@@ -79,6 +82,12 @@ NUMBERS_OUT_OF_RANGE = [
 def test_numbers_out_of_range_are_refused_with_their_owner(kind, fields, message):
     with pytest.raises(SceneError, match=message):
         kind("it", **fields)
+
+
+def test_an_environment_may_not_be_brighter_than_light_may_be():
+    sky = Environment("sky", np.full((1, 2, 3), 1e8, np.float32))
+    with pytest.raises(SceneError, match=r"the world: radiance times its environment is \(1e\+16, 0, 0\)"):
+        replace(closed_box(), world_radiance=(1e8, 0.0, 0.0), environment=sky)
 
 
 def test_arrays_of_an_object_have_a_row_a_triangle():
