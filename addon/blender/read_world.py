@@ -6,7 +6,9 @@ import numpy as np
 from mathutils import Euler
 
 from ..core.environment import UNTURNED, Environment
-from .read_images import linear_pixels, mean_colour
+from ..core.scene import BRIGHTEST
+from .read_images import linear_pixels
+from .render_world import WorldError, rendered_world
 from .shader_nodes import Unreadable, constant, constant_vector, surface_shader
 
 BLACK = (0.0, 0.0, 0.0)
@@ -17,10 +19,10 @@ def read_world(world, depsgraph, warn) -> tuple[tuple[float, float, float], Envi
     """L of the world [W/(m^2 sr)], and the image that it multiplies or None; no world is black."""
     if world is None:
         return BLACK, None
-    world = world.evaluated_get(depsgraph)
-    if not world.use_nodes or world.node_tree is None:
-        return _radiance(world.color, 1.0), None
-    shader = surface_shader(world.node_tree, "OUTPUT_WORLD")
+    evaluated = world.evaluated_get(depsgraph)
+    if not evaluated.use_nodes or evaluated.node_tree is None:
+        return _radiance(evaluated.color, 1.0), None
+    shader = surface_shader(evaluated.node_tree, "OUTPUT_WORLD")
     if shader is None:
         return BLACK, None
     try:
@@ -29,27 +31,32 @@ def read_world(world, depsgraph, warn) -> tuple[tuple[float, float, float], Envi
         strength = constant(shader.feeding("Strength"))
         if strength <= 0:
             return BLACK, None
-        colour, environment = _colour(shader.feeding("Color"), world, warn)
+        colour, environment = _colour(shader.feeding("Color"), warn)
         return _radiance(colour, strength), environment
-    except Unreadable as error:
-        warn(f"world '{world.name}': its {error} cannot be read: its viewport colour is used")
+    except Unreadable as unreadable:
+        return _rendered(world, depsgraph, unreadable, warn)
+
+
+def _rendered(world, depsgraph, unreadable, warn):
+    """What Cycles shows of a world, or its viewport colour."""
+    try:
+        pixels = rendered_world(world, depsgraph.scene.frame_current)
+    except WorldError as error:
+        warn(f"world '{world.name}': its {unreadable} cannot be read ({error}): its viewport colour is used")
         return _radiance(world.color, 1.0), None
+    return WHITE, Environment(world.name, np.clip(np.nan_to_num(pixels, posinf=0.0), 0.0, BRIGHTEST))
 
 
-def _colour(reached, world, warn):
+def _colour(reached, warn):
     """A colour, and the environment that it multiplies or None."""
     if reached.is_constant:
         return reached.socket.default_value, None
     if reached.node.type == "RGB":
         return reached.node.outputs[0].default_value, None
-    image = getattr(reached.node, "image", None)
-    if reached.node.type not in {"TEX_ENVIRONMENT", "TEX_IMAGE"} or image is None:
-        raise Unreadable(f"{reached.node.bl_label} node")
-    pixels = linear_pixels(image, warn)
-    if reached.node.type == "TEX_IMAGE" or reached.node.projection != "EQUIRECTANGULAR":
-        warn(f"world '{world.name}': its image '{image.name}' is not equirectangular: it is averaged to one colour")
-        return mean_colour(pixels), None
-    return WHITE, Environment(image.name, pixels, _turn(reached.feeding("Vector")))
+    node = reached.node
+    if node.type != "TEX_ENVIRONMENT" or node.image is None or node.projection != "EQUIRECTANGULAR":
+        raise Unreadable(f"{node.bl_label} node")
+    return WHITE, Environment(node.image.name, linear_pixels(node.image, warn), _turn(reached.feeding("Vector")))
 
 
 def _turn(vector):

@@ -9,9 +9,12 @@ import numpy as np
 import pytest
 
 from addon.blender.read_scene import read_scene
+from addon.blender.render_world import WorldError
 from addon.core.bake import bake
+from addon.core.environment import Environment
 from addon.core.scene import AreaLight, PointLight, SunLight
 from addon.core.settings import BakeSettings
+from addon.core.sky import with_suns
 
 pytestmark = pytest.mark.usefixtures("empty_file")
 
@@ -221,26 +224,70 @@ def test_a_mapping_turns_the_sky(sky_image, read):
     np.testing.assert_allclose(read()[1].environment.to_image, np.diag([-1, 1, 1]) @ quarter.T, atol=FLOAT32)
 
 
-@pytest.mark.parametrize(
-    "how", [{"Location": (0, 0, 1)}, {"Scale": (1, 1, 2)}, {"coordinates": "Camera"}, {"kind": "NORMAL"}]
-)
-def test_a_sky_that_is_more_than_turned_is_named(sky_image, read, how):
-    _, tree, node = sky_image()
-    turned(tree, node, **how)
+def counts():
+    """How many data-blocks of each kind the file has."""
+    kinds = ("scenes", "worlds", "objects", "cameras", "images", "node_groups")
+    return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
+
+
+def test_a_world_that_cannot_be_read_is_rendered_and_the_file_stays_as_it_is(sky_image, read):
+    """A sky by way of coordinates that no Mapping node gives is what it is by its image."""
+    pixels, tree, node = sky_image(strength=0.5)
+    geometry = tree.nodes.new("ShaderNodeNewGeometry")
+    scaled = tree.nodes.new("ShaderNodeVectorMath")
+    scaled.operation = "SCALE"
+    scaled.inputs["Scale"].default_value = -1
+    tree.links.new(geometry.outputs["Incoming"], scaled.inputs[0])
+    tree.links.new(scaled.outputs[0], node.inputs["Vector"])
+    before = counts()
+    _, scene = read()
+    assert {**counts(), "objects": before["objects"]} == before  # the cube
+    assert not scene.warnings
+    rows, columns = (part.ravel() for part in np.mgrid[0:512:7, 0:1024:7])
+    seen = Environment("Sunset", pixels).seen(scene.environment.directions(rows, columns))
+    # a sixteenth of a pixel of the image wide: between 20 and 0 light changes by so much over one
+    np.testing.assert_allclose(scene.environment.pixels[rows, columns], 0.5 * seen, atol=0.5 * 20 / 16 / 2)
+
+
+def test_the_world_is_what_a_diffuse_surface_sees_and_not_the_camera(set_world, read):
+    tree, shown = set_world((*COLOUR, 1), 1.0)
+    lighting, mix = tree.nodes.new("ShaderNodeBackground"), tree.nodes.new("ShaderNodeMixShader")
+    lighting.inputs["Color"].default_value = (0.25, 0.5, 1, 1)
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_WORLD")
+    tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"], mix.inputs[0])
+    tree.links.new(lighting.outputs[0], mix.inputs[1])
+    tree.links.new(shown.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    _, scene = read()
+    np.testing.assert_allclose(scene.environment.pixels[::50, ::50], np.full((11, 21, 3), (0.25, 0.5, 1)), rtol=1e-5)
+    np.testing.assert_allclose(scene.world_radiance, 1)
+
+
+def test_the_sky_texture_has_its_sun_where_it_says(set_world, read):
+    tree, background = set_world(strength=0.1)
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_elevation, sky.sun_rotation = radians(35), radians(40)
+    tree.links.new(sky.outputs[0], background.inputs["Color"])
+    _, scene = read()
+    (sun,) = with_suns(scene).lights
+    towards = np.array([sin(radians(40)) * cos(radians(35)), cos(radians(40)) * cos(radians(35)), sin(radians(35))])
+    np.testing.assert_allclose(sun.direction, -towards, atol=radians(0.1))
+    assert sky.sun_size < sun.angle < 2 * sky.sun_size
+
+
+def test_a_world_that_cannot_be_rendered_is_never_silently_black(set_world, read, monkeypatch):
+    tree, background = set_world()
     bpy.context.scene.world.color = COLOUR
+    tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
+
+    def fail(world, frame):
+        raise WorldError("out of memory")
+
+    monkeypatch.setattr("addon.blender.read_world.rendered_world", fail)
     _, scene = read()
-    assert scene.environment is None
     np.testing.assert_allclose(scene.world_radiance, COLOUR)
-    assert any("'Sky'" in warning for warning in scene.warnings)
-
-
-def test_an_image_that_is_no_panorama_is_averaged_and_named(sky_image, read):
-    pixels, _, node = sky_image()
-    node.projection = "MIRROR_BALL"
-    _, scene = read()
-    assert scene.environment is None
-    np.testing.assert_allclose(scene.world_radiance, 2 * pixels.mean(axis=(0, 1)), rtol=1e-5)
-    assert any("'Sky'" in warning and "'Sunset'" in warning for warning in scene.warnings)
+    (warning,) = scene.warnings
+    assert warning == "world 'Sky': its Sky Texture node cannot be read (out of memory): its viewport colour is used"
 
 
 def test_a_cube_under_a_turned_sky_has_the_light_that_cycles_gives_it(sky_image, add_cube):
@@ -276,12 +323,3 @@ def our_light(obj):
     colours = bake(scene, BakeSettings(target="vertex", error=0.01)).corner_colours
     faces = scene.objects[0].polygons
     return np.array([colours[faces == face].mean(axis=(0, 1)) for face in range(len(obj.data.polygons))])
-
-
-def test_an_unreadable_sky_is_never_silently_black(set_world, read):
-    tree, background = set_world()
-    bpy.context.scene.world.color = COLOUR
-    tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
-    _, scene = read()
-    np.testing.assert_allclose(scene.world_radiance, COLOUR)
-    assert any("'Sky'" in warning for warning in scene.warnings)
