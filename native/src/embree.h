@@ -24,8 +24,10 @@ enum {
 };
 #define RTC_INVALID_ID 0xFFFFFFFFu
 
+/* Embree reads rays by aligned loads, which crash where a ray lies on the stack as a float does. */
 typedef struct RTCRay {
-    float org_x, org_y, org_z, tnear;
+    _Alignas(16) float org_x;
+    float org_y, org_z, tnear;
     float dir_x, dir_y, dir_z, time;
     float tfar;
     uint32_t mask, id, flags;
@@ -38,11 +40,12 @@ typedef struct RTCHit {
 } RTCHit;
 
 typedef struct RTCRayHit {
-    _Alignas(16) RTCRay ray;
+    RTCRay ray;
     RTCHit hit;
 } RTCRayHit;
 
 _Static_assert(sizeof(RTCRay) == 48 && sizeof(RTCRayHit) == 96, "Embree 4.4's ray layout");
+_Static_assert(_Alignof(RTCRay) == 16 && _Alignof(RTCRayHit) == 16, "Embree 4.4's ray alignment");
 
 struct pl_embree {
     void *library;
