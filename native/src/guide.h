@@ -35,7 +35,7 @@ static inline int guide_step(const float *shares, float total, float *io_x) {
     for (; k < PL_GUIDE_SIDE - 1 && left >= shares[k]; ++k)
         left -= shares[k];
     const float inside = shares[k] > 0 ? left / shares[k] : 0.5f;
-    *io_x = ((float)k + (inside < 0.999999f ? inside : 0.999999f)) * (1.0f / PL_GUIDE_SIDE);
+    *io_x = ((float)k + (inside < 0.999999f ? inside : 0.999999f)) * (1.0f / (float)PL_GUIDE_SIDE);
     return k;
 }
 
@@ -50,7 +50,8 @@ static inline float guide_warp(const guide *by, float *io_x, float *io_y) {
 
 /* The cell that (x, y) lies in. */
 static inline int guide_cell(float x, float y) {
-    return PL_GUIDE_SIDE * (int)(x * PL_GUIDE_SIDE) + (int)(y * PL_GUIDE_SIDE);
+    const float side = PL_GUIDE_SIDE;
+    return PL_GUIDE_SIDE * (int)(x * side) + (int)(y * side);
 }
 
 #endif
