@@ -22,10 +22,12 @@ def read_world(world, depsgraph, warn) -> tuple[tuple[float, float, float], Envi
     evaluated = world.evaluated_get(depsgraph)
     if not evaluated.use_nodes or evaluated.node_tree is None:
         return _radiance(evaluated.color, 1.0), None
-    shader = surface_shader(evaluated.node_tree, "OUTPUT_WORLD")
-    if shader is None:
+    if hasattr(world, "cycles_visibility") and not world.cycles_visibility.diffuse:
         return BLACK, None
     try:
+        shader = surface_shader(evaluated.node_tree, "OUTPUT_WORLD")
+        if shader is None:
+            return BLACK, None
         if shader.node.type not in {"BACKGROUND", "EMISSION"}:
             raise Unreadable(f"{shader.node.bl_label} node")
         strength = constant(shader.feeding("Strength"))
@@ -39,6 +41,8 @@ def read_world(world, depsgraph, warn) -> tuple[tuple[float, float, float], Envi
 
 def _rendered(world, depsgraph, unreadable, warn):
     """What Cycles shows of a world, or its viewport colour."""
+    if any(node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in world.node_tree.nodes):
+        warn(f"world '{world.name}': its volume is left out")
     try:
         pixels = rendered_world(world, depsgraph.scene.frame_current)
     except WorldError as error:
@@ -56,7 +60,8 @@ def _colour(reached, warn):
     node = reached.node
     if node.type != "TEX_ENVIRONMENT" or node.image is None or node.projection != "EQUIRECTANGULAR":
         raise Unreadable(f"{node.bl_label} node")
-    return WHITE, Environment(node.image.name, linear_pixels(node.image, warn), _turn(reached.feeding("Vector")))
+    turn = _turn(reached.feeding("Vector"))
+    return WHITE, Environment(node.image.name, linear_pixels(node.image, warn), turn)
 
 
 def _turn(vector):

@@ -18,8 +18,8 @@ SIDE = 128  # of the map that rays look up, about a degree a texel: what is fine
 TAPS = 8  # along a side of each texel
 BRIGHT = 30.0  # times the mean luminance: what an image has above it is taken out for suns,
 WIDEST = 0.05  # of no more than so many radians around their brightest pixel, about three degrees,
-MOST_SUNS = 16
-LEAST_SUN = 1e-3  # of all light; what gives less stays in the image
+MOST_SPOTS, MOST_SUNS = 256, 16  # of so many spots, those of most light,
+LEAST_SUN = 1e-3  # of all light at the least; the rest stays in the image
 
 
 def with_suns(scene: Scene) -> Scene:
@@ -65,18 +65,24 @@ def _parted(environment: Environment, radiance):
     excess = above[:, None] * environment.pixels[rows, columns]
     towards, sizes = environment.directions(rows, columns), solid_angles[rows]
     power = above * luminance[rows, columns] * sizes
+    spots = [spot for spot in _spots(towards, power) if power[spot].sum() >= LEAST_SUN * light]
+    spots = sorted(spots, key=lambda spot: -power[spot].sum())[:MOST_SUNS]
     suns, pixels = [], environment.pixels.copy()
-    while len(suns) < MOST_SUNS and len(power):
-        near = towards @ towards[np.argmax(power / sizes)] >= np.cos(WIDEST)
-        if power[near].sum() < LEAST_SUN * light:
-            break
-        irradiance = sizes[near] @ excess[near] * radiance
-        suns.append(_sun(environment, towards[near], power[near], irradiance, sizes[near].min()))
-        pixels[rows[near], columns[near]] -= excess[near].astype(np.float32)
-        rows, columns, excess, towards, sizes, power = (
-            of_all[~near] for of_all in (rows, columns, excess, towards, sizes, power)
-        )
+    for spot in spots:
+        irradiance = sizes[spot] @ excess[spot] * radiance
+        suns.append(_sun(environment, towards[spot], power[spot], irradiance, sizes[spot].min()))
+        pixels[rows[spot], columns[spot]] -= excess[spot].astype(np.float32)
     return replace(environment, pixels=np.maximum(pixels, 0)), tuple(suns)
+
+
+def _spots(towards, power):
+    """Pixels of directions (N, 3) in heaps around those of most power (N,): up to MOST_SPOTS arrays of indices."""
+    spots, left = [], np.arange(len(power))
+    while len(left) and len(spots) < MOST_SPOTS:
+        near = towards[left] @ towards[left[np.argmax(power[left])]] >= np.cos(WIDEST)
+        spots.append(left[near])
+        left = left[~near]
+    return spots
 
 
 def _sun(environment: Environment, towards, power, irradiance, pixel):

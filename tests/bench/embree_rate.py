@@ -27,6 +27,7 @@ from patchlight.core.guides import learn_guides
 from patchlight.core.radiosity import solve_radiosity
 from patchlight.core.receivers import surface_receivers
 from patchlight.core.settings import BakeSettings
+from patchlight.core.sky import with_suns
 from patchlight.core.smoothing import texel_grid
 from patchlight.core.sound_faces import sound_faces
 from patchlight.core.texel_light import TexelLight, split_where_blocked
@@ -47,7 +48,7 @@ def main() -> None:
         recorder = open_recorder(Path(folder))
         open_blend(args.blend or next(p for p in demo.save_demo(folder) if p.stem == "room"))
         settings = BakeSettings(texels=args.texels, error=0.2)
-        scene = sound_faces(bake_scene.prepare(bpy.context.scene, settings).scene).scene
+        scene = with_suns(sound_faces(bake_scene.prepare(bpy.context.scene, settings).scene).scene)
         print("| kernel | rays | ours [M rays/s] | bare loop [M rays/s] | of the bare loop |")
         print("| --- | --- | --- | --- | --- |")
         with Workers(1) as workers:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, radians, sin, tan
+from math import cos, degrees, pi, radians, sin, tan
 
 import bpy
 import numpy as np
@@ -263,16 +263,109 @@ def test_the_world_is_what_a_diffuse_surface_sees_and_not_the_camera(set_world, 
     np.testing.assert_allclose(scene.world_radiance, 1)
 
 
-def test_the_sky_texture_has_its_sun_where_it_says(set_world, read):
+def sky_texture(set_world, degrees):
+    """A sky whose sun is 35 degrees up, and of that many wide."""
     tree, background = set_world(strength=0.1)
     sky = tree.nodes.new("ShaderNodeTexSky")
-    sky.sun_elevation, sky.sun_rotation = radians(35), radians(40)
+    sky.sun_elevation, sky.sun_rotation, sky.sun_size = radians(35), radians(40), radians(degrees)
     tree.links.new(sky.outputs[0], background.inputs["Color"])
-    _, scene = read()
-    (sun,) = with_suns(scene).lights
+
+
+def test_the_sky_texture_has_its_sun_where_it_says_and_as_bright_whatever_its_size(set_world, read):
     towards = np.array([sin(radians(40)) * cos(radians(35)), cos(radians(40)) * cos(radians(35)), sin(radians(35))])
-    np.testing.assert_allclose(sun.direction, -towards, atol=radians(0.1))
-    assert sky.sun_size < sun.angle < 2 * sky.sun_size
+    light = []
+    for size in (0.05, 0.545, 5.0):
+        sky_texture(set_world, size)
+        (sun,) = with_suns(read()[1]).lights
+        np.testing.assert_allclose(sun.direction, -towards, atol=radians(0.1))
+        # less for the limb, which is darker; more for pixels, a third of a degree wide
+        assert 0.9 * max(size, 0.5) < degrees(sun.angle) < max(size, 0.5) + 0.5
+        light.append(sun.irradiance)
+    # the sky around the disc that is brighter than 30 times the mean goes with it
+    np.testing.assert_allclose(light, np.broadcast_to(light[1], (3, 3)), rtol=0.03)
+
+
+def test_a_cube_under_the_sky_texture_has_the_light_that_cycles_gives_it(set_world, add_cube):
+    sky_texture(set_world, 0.545)
+    cube = add_cube()
+    ours, cycles = our_light(cube), cycles_light(cube)
+    # noise as above; the lower face sees the dark below the horizon only
+    np.testing.assert_allclose(ours, cycles, rtol=0.03, atol=1e-3 * cycles.max())
+
+
+@pytest.mark.parametrize("image", ["none", "lost"])
+def test_a_sky_image_that_is_not_there_is_named_and_not_pink(sky_image, read, image):
+    _, _, node = sky_image()
+    bpy.context.scene.world.color = COLOUR
+    if image == "none":
+        node.image = None
+    else:
+        node.image = bpy.data.images.new("Lost", 1, 1)
+        node.image.source, node.image.filepath = "FILE", "/nowhere/lost.exr"
+        node.image.reload()
+    _, scene = read()
+    assert scene.environment is None
+    np.testing.assert_allclose(scene.world_radiance, COLOUR)
+    assert any("'Sky'" in warning for warning in scene.warnings)
+
+
+def test_a_world_that_cameras_do_not_see_lights_as_any_other(set_world, read):
+    tree, background = set_world((0, 0, 0, 1), 2.0)
+    gradient = tree.nodes.new("ShaderNodeTexGradient")
+    tree.links.new(gradient.outputs[0], background.inputs["Color"])
+    tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], gradient.inputs["Vector"])
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_WORLD")
+    tree.links.new(tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], output.inputs["Volume"])
+    world = bpy.context.scene.world
+    world.cycles_visibility.camera = False
+    _, scene = read()
+    rows, columns = (part.ravel() for part in np.mgrid[0:512:50, 0:1024:50])
+    # a gradient is x, from 0 to 1
+    exact = 2 * np.clip(scene.environment.directions(rows, columns)[:, 0], 0, 1)
+    np.testing.assert_allclose(scene.environment.pixels[rows, columns, 1], exact, atol=0.02)
+    assert any("'Sky'" in warning and "volume" in warning for warning in scene.warnings)
+    world.cycles_visibility.diffuse = False
+    assert read()[1].world_radiance == (0, 0, 0)
+
+
+def test_light_path_is_a_diffuse_rays_in_groups_too_and_a_muted_link_stays_muted(set_world, read):
+    tree, background = set_world((*COLOUR, 1), 1.0)
+    group = bpy.data.node_groups.new("Group", "ShaderNodeTree")
+    group.interface.new_socket("Factor", in_out="OUTPUT", socket_type="NodeSocketFloat")
+    path, out = group.nodes.new("ShaderNodeLightPath"), group.nodes.new("NodeGroupOutput")
+    group.links.new(path.outputs["Diffuse Depth"], out.inputs[0])
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    product = tree.nodes.new("ShaderNodeMath")
+    product.operation = "ADD"
+    tree.links.new(node.outputs[0], product.inputs[0])
+    product.inputs[1].default_value = 2.0
+    tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Diffuse Ray"], product.inputs[1]).is_muted = True
+    tree.links.new(product.outputs[0], background.inputs["Strength"])
+    before = counts()
+    _, scene = read()
+    assert counts()["node_groups"] == before["node_groups"]
+    np.testing.assert_allclose(
+        scene.environment.pixels[::50, ::50], np.full((11, 21, 3), 3 * np.array(COLOUR)), rtol=1e-5
+    )
+
+
+def test_what_was_moved_without_a_key_stays_there_while_the_world_is_rendered(set_world, add_cube):
+    tree, background = set_world()
+    tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
+    cube = add_cube()
+    cube.keyframe_insert("location", frame=1)
+    cube.location.x = 5
+    read_scene(bpy.context.scene)
+    assert cube.location.x == 5
+
+
+def test_a_world_of_a_muted_background_is_what_cycles_shows(set_world, read):
+    _, background = set_world((*COLOUR, 1), 4.0)
+    background.mute = True
+    _, scene = read()
+    seen = np.array(scene.world_radiance) * (1 if scene.environment is None else scene.environment.pixels[::50, ::50])
+    np.testing.assert_allclose(seen, np.broadcast_to(0.0, seen.shape), atol=1e-6)
 
 
 def test_a_world_that_cannot_be_rendered_is_never_silently_black(set_world, read, monkeypatch):

@@ -162,11 +162,31 @@ def test_of_many_bright_spots_the_brightest_become_suns_and_none_is_lost():
         pixels[row, column] = 100.0 * (k + 10)
     scene = under(Environment("lamps", pixels), [floor()])
     suns, rest = scene.lights, scene.environment.pixels
-    assert len(suns) == MOST_SUNS
     assert all(isinstance(sun, SunLight) for sun in suns)
-    _, solid_angles = sphere(ROWS)
-    luminances = (rest @ LUMINANCE)[tuple(np.array(spots).T)]
+    directions, solid_angles = sphere(ROWS)
     most = BRIGHT * ((pixels @ LUMINANCE) * solid_angles).sum() / (4 * np.pi)
-    assert np.sum(luminances <= most * (1 + 1e-5)) >= MOST_SUNS
+    above = np.maximum(pixels @ LUMINANCE - most, 0) * solid_angles
+    brightest = np.sort(above.ravel())[::-1][:MOST_SUNS]
+    assert [np.dot(LUMINANCE, sun.irradiance) for sun in suns] == pytest.approx(brightest, rel=1e-3)  # middle rule
+    shown = directions.reshape(-1, 3)[np.argsort(-above.ravel())[:MOST_SUNS]]
+    assert np.array([sun.direction for sun in suns]) == pytest.approx(-shown, abs=1e-6)
     kept = ((rest @ LUMINANCE) * solid_angles).sum() + sum(np.dot(LUMINANCE, sun.irradiance) for sun in suns)
     assert kept == pytest.approx(((pixels @ LUMINANCE) * solid_angles).sum(), rel=1e-3)  # the reference's middle rule
+
+
+def test_a_hot_pixel_and_glints_leave_the_sun_a_sun():
+    """Glints as bright as the sun, each of a fifth of its light at the most; a pixel at the pole is next to nothing."""
+    environment = sunny()
+    pixels = environment.pixels.copy()
+    is_sun = pixels[..., 0] > 1
+    pixels[0, 3] = 1e6
+    for column in range(0, 240, 8):
+        pixels[30, column] = pixels[is_sun][0]
+    scene = under(replace(environment, pixels=pixels), [floor()])
+    (alone,) = under(environment, [floor()]).lights
+    strongest = scene.lights[0]
+    assert len(scene.lights) == MOST_SUNS
+    # what is above the mean, which the glints have raised
+    assert strongest.irradiance == pytest.approx(alone.irradiance, rel=0.1)
+    assert strongest.direction == pytest.approx(alone.direction, abs=1e-6)
+    assert scene.environment.pixels[0, 3, 0] == 1e6
