@@ -20,7 +20,7 @@ CORE_ORDER = (
     *("transport", "aimed", "hemicube", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
     *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides"),
-    *("patch_solution", "patch_light", "decomposition", "choose", "radiosity"),
+    *("patch_solution", "patch_light", "decomposition", "choose", "laws", "radiosity"),
     *("charts", "cut", "flatten", "packing", "unwrap", "texels", "gaps", "smoothing", "probes"),
     *(
         "denoiser",

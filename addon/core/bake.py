@@ -154,5 +154,7 @@ def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, l
         target_error=settings.error,
         target_reached=irradiance.target_reached,
         energy=energy,
+        closure=solved.laws.closure,
+        reciprocity=solved.laws.reciprocity,
         warnings=tuple(warnings),
     )

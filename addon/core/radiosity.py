@@ -13,6 +13,7 @@ from .dense import require_direct_size, solve_direct
 from .emitters import LUMINANCE, Emitters
 from .exchange import exchange_of
 from .kernel import KernelScene
+from .laws import Laws, measured_laws
 from .parted import finer_where_parted
 from .patch_light import QUICK_ERROR, PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
@@ -50,14 +51,16 @@ class Solved:
     emitters : the scene's lights and glowing triangles
     sources : the same, and the sides that are so bright that receivers sample them as lights
     solution : the solver's own result
+    laws : how far transport between the patches keeps them
     method, choice : what was picked, and why
-    rays : {"patches": ..., "solve": ...}
+    rays : {"patches": ..., "solve": ..., "laws": ...}
     """
 
     patches: PatchSolution
     emitters: Emitters
     sources: Emitters
     solution: Solution
+    laws: Laws
     method: str
     choice: str
     rays: dict[str, int]
@@ -117,7 +120,9 @@ def _solved(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: Bak
         sky=sky,
     )
     sources = with_bright_sides(scene, kernel.centre, patches, emitters, solution.radiosity, bright)
-    return Solved(field, emitters, sources, solution, method, choice, {"patches": lit.rays, "solve": solution.rays})
+    laws, law_rays = measured_laws(scene, kernel, patches, settings.seed)
+    rays = {"patches": lit.rays, "solve": solution.rays, "laws": law_rays}
+    return Solved(field, emitters, sources, solution, laws, method, choice, rays)
 
 
 def _target_share(scene: Scene) -> float:

@@ -40,6 +40,7 @@ class Report:
     target_error : what was asked for
     target_reached : False when the time limit or the budget of rays came first
     energy : the solver's flux balance
+    closure, reciprocity : how far transport in this scene keeps these laws (laws.Laws)
     warnings : one sentence each, with the object or material it names
     """
 
@@ -60,6 +61,8 @@ class Report:
     target_error: float = 0.0
     target_reached: bool = True
     energy: Energy = field(default_factory=Energy)
+    closure: float = 0.0
+    reciprocity: float = 0.0
     warnings: tuple[str, ...] = ()
 
     def with_stages(self, seconds: dict[str, float]) -> Report:
