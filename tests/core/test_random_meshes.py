@@ -21,6 +21,7 @@ from addon.core.sound_faces import sound_faces
 from tests.random_scenes import scenes
 
 HANG = 120  # [s]; the slowest of these bakes takes a few, so this is no bake but a loop without an end
+ONE_EACH, MANY_PATCHES = 1e9, 1000  # [m]: a triangle is one patch; about so many are cut at the most
 ROUTES = (
     ("auto", "auto"),
     ("monte-carlo", "stochastic"),
@@ -42,7 +43,7 @@ def bake_settings(draw):
         texels=draw(st.sampled_from((64, 256, 1024))),
         density=draw(st.sampled_from((None, None, None, 1e-9, 3.0, 1e9))),
         keep_uvs=draw(st.sampled_from((False, False, True))),
-        patch_size=draw(st.sampled_from((1e9, 1e9, 0.5))),
+        patch_size=draw(st.sampled_from((ONE_EACH, ONE_EACH, 0.5))),
         smooth_angle_deg=draw(st.sampled_from((0.0, 30.0, 180.0))),
         seed=draw(st.sampled_from((0, 1, (1 << 32) - 1))),
         threads=1,
@@ -72,11 +73,17 @@ def test_any_mesh_bakes_to_light_or_is_refused_by_name(scene, asked):
 
 
 def affordable(scene, asked):
-    """Without a density that is allowed, but asks for millions of texels: too slow to do ten thousand times."""
+    """Without a density or a patch size that is allowed, but too slow to do ten thousand times.
+
+    Millions of texels; a hundred thousand patches, which a closed room that absorbs nothing needs hundreds of times.
+    """
     sound = sound_faces(scene).scene
     wanted = np.array([obj.is_target for obj in sound.objects for _ in range(obj.count)], bool)
-    texels = triangle_areas(sound)[wanted].sum() * (asked.density or 0) ** 2
-    return replace(asked, density=None) if 1e4 < texels < 4 * MOST_TEXELS else asked
+    areas = triangle_areas(sound)
+    texels = areas[wanted].sum() * (asked.density or 0) ** 2
+    if 1e4 < texels < 4 * MOST_TEXELS:
+        asked = replace(asked, density=None)
+    return replace(asked, patch_size=ONE_EACH) if areas.sum() > MANY_PATCHES * asked.patch_size**2 else asked
 
 
 def bake_or_refusal(scene, asked):
