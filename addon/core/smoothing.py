@@ -111,11 +111,11 @@ def kept(grid: TexelGrid, values, smooth_values, deviations):
     ones get little of it.
     """
     luminance = (smooth_values @ LUMINANCE).astype(np.float32)
-    given, noise = _around(grid, values @ LUMINANCE - luminance), _around(grid, deviations)
-    given /= np.where(noise > 0, noise, 1)
-    given *= deviations / np.where(luminance > 0, luminance, np.inf)
+    given, noise = _around(grid, values @ LUMINANCE - luminance), np.maximum(_around(grid, deviations), deviations)
+    given *= deviations / np.where(noise > 0, noise, 1)
     # what is dimmer than rounding beside what is bright has no share that means something
-    return (1 + np.clip(given, -MOST_KEPT, MOST_KEPT))[:, None] * smooth_values
+    given = np.clip(given, -MOST_KEPT * luminance, MOST_KEPT * luminance)
+    return (1 + given / np.where(luminance > 0, luminance, 1))[:, None] * smooth_values
 
 
 def _around(grid: TexelGrid, luminance):
