@@ -15,7 +15,7 @@ MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "
 CORE_ORDER = (
     *("ranges", "settings", "environment", "scene", "sound_faces", "textures", "emitters", "sky"),
     *("relative", "z_order"),
-    *("report", "workers", "kernel", "patches", "parted"),
+    *("report", "workers", "kernel", "patches", "parted", "joined"),
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
     *("transport", "aimed", "hemicube", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),

@@ -175,8 +175,9 @@ def _solved(scene, patches, emitted, exchange_row, is_lower=False):
 
 def _polygons(scene, patches):
     """Corners of all patches, float64 (P, 4, 3) [m]; those at an apex repeat one."""
-    halves = patch_triangles(scene, patches, np.arange(len(patches)))
-    return np.concatenate([halves[:, 0], halves[:, 1, 2:]], axis=1)
+    halves, _ = patch_triangles(scene, patches, np.arange(len(patches)))
+    first, second = halves.reshape(2, len(patches), 3, 3)
+    return np.concatenate([first, second[:, 2:]], axis=1)
 
 
 def even_points(scene: Scene, count: int, seed: int):

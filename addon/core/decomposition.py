@@ -60,9 +60,9 @@ def patches_at(grid: Grid, along, triangles, down, across):
     row += first_rows[triangles]
     column, j = _part(across, first_cells[row + 1] - first_cells[row])
     cells = first_cells[row] + column
-    first_patches = np.concatenate([[0], np.cumsum(along**2)])
+    first_pieces = np.concatenate([[0], np.cumsum(along**2)])
     parts = along[cells]
-    return first_patches[cells] + _part(i, parts)[0] * parts + _part(j, parts)[0]
+    return first_pieces[cells] + _part(i, parts)[0] * parts + _part(j, parts)[0]
 
 
 def _part(share, parts):

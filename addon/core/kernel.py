@@ -19,6 +19,7 @@ except ImportError as error:  # a source tree that has not been built, or a zip 
         f"Patchlight's native kernel cannot be loaded ({error}): install the zip of your platform, or run `make`"
     ) from error
 
+NO_OWNERS = np.zeros(0, np.int32)  # of pieces: each is a patch
 GUIDE_CELLS = 64  # PL_GUIDE_CELLS of native/include/patchlight.h
 
 LIBRARY_PATTERNS = {
@@ -83,10 +84,12 @@ class KernelScene:
         self.workers.each_range(len(out), 1 << 16, call)
         return out.astype(bool)
 
-    def set_patches(self, apexes, first_rows, first_cells, first_patches) -> None:
-        """Cut the triangles into patches (layout: native/include/patchlight.h)."""
-        self._patches = _kernel.create_patches(apexes, first_rows, first_cells, first_patches)
-        self.side_count = 2 * int(first_patches[-1])
+    def set_patches(self, apexes, first_rows, first_cells, first_pieces, owners=NO_OWNERS, areas=None) -> None:
+        """Cut the triangles into patches, of pieces that are joined by ``owners`` (native/include/patchlight.h)."""
+        areas = _rows(np.zeros(len(owners)) if areas is None else areas, np.float32)
+        count = int(owners.max()) + 1 if len(owners) else int(first_pieces[-1])
+        self._patches = _kernel.create_patches(apexes, first_rows, first_cells, first_pieces, owners, areas, count)
+        self.side_count = 2 * count
 
     def patch_points(self, patches, samples, seed):
         """Even points on patches (K,): triangles int32 (K * samples,), barycentrics float32 (K * samples, 3)."""

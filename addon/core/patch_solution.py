@@ -101,9 +101,9 @@ def _weighted_median(values, weights):
 
 def with_bright_sides(scene: Scene, centre, patches: Patches, emitters: Emitters, radiosity, bright) -> Emitters:
     """The emitters with the bright sides among them, each glowing on its own side only."""
-    corners = patch_triangles(scene, patches, bright // 2)
-    radiances = np.zeros((len(bright), 2, 3))
-    radiances[np.arange(len(bright)), bright % 2] = radiance_from_exitance(radiosity[bright])
-    corners = corners.reshape(-1, 3, 3)
+    shining, which = np.unique(bright // 2, return_inverse=True)
+    radiances = np.zeros((len(shining), 2, 3))
+    radiances[which, bright % 2] = radiance_from_exitance(radiosity[bright])
+    corners, which = patch_triangles(scene, patches, shining)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return with_sources(emitters, corners[areas > 0], np.repeat(radiances.reshape(-1, 6), 2, axis=0)[areas > 0], centre)
+    return with_sources(emitters, corners[areas > 0], radiances.reshape(-1, 6)[which[areas > 0]], centre)

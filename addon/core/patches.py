@@ -1,7 +1,8 @@
 """Patches: triangles cut into pieces of about one size, each with one unknown radiosity a side.
 
-A patch never spans two triangles, and one triangle is never more than its share of all patches, so that a ground plane
-around the house does not take the patches away from its rooms. The layout is in native/include/patchlight.h.
+One triangle is never more than its share of all patches, so that a ground plane around the house does not take the
+patches away from its rooms. A patch lies in one triangle, unless small ones are joined (joined.py). The layout is in
+native/include/patchlight.h.
 """
 
 from __future__ import annotations
@@ -28,12 +29,14 @@ class Patches:
     ----------
     size : longest edge of a patch, about [m]
     areas : float64 (P,) [m^2]
-    triangles : int32 (P,) which triangle each is part of
+    triangles : int32 (P,) which triangle each is part of, or has the most of
     reflectance : float32 (P, 3) rho, the mean over the patch; 0 where the material transmits
     bounds : float32 (P, 4) where each lies on its triangle: distance from the apex at its wide and its narrow end, and
         from the next corner to the one after at its first and its second side, all as shares
     apexes : uint8 (T,)
-    cells : int32 (P,) which cell of its triangle's grid each is, or is part of
+    cells : int32 (P,) which cell of its triangle's grid each is, or is part of, or has the most of
+    owners, pieces : int32 (Q,) which patch each of ``pieces`` (Q) is part of, where some were joined; these have the
+        bounds then
     """
 
     size: float
@@ -43,6 +46,8 @@ class Patches:
     bounds: np.ndarray
     apexes: np.ndarray
     cells: np.ndarray
+    owners: np.ndarray | None = None
+    pieces: Patches | None = None
 
     def __len__(self) -> int:
         return len(self.areas)
@@ -116,13 +121,13 @@ def grid_of(scene: Scene, size: float, budget: int) -> Grid:
 
 def cut(scene: Scene, kernel: KernelScene, grid: Grid, along, seed: int) -> Patches:
     """Patches of a grid, ``along`` (C,) of them along each side of every cell; the kernel is told of them."""
-    first_patches = _offsets(along**2)
-    kernel.set_patches(grid.apexes, grid.first_rows, grid.first_cells, first_patches.astype(np.int32))
+    first_pieces = _offsets(along**2)
+    kernel.set_patches(grid.apexes, grid.first_rows, grid.first_cells, first_pieces.astype(np.int32))
     rows, columns = np.diff(grid.first_rows), np.diff(grid.first_cells)
     row_triangle = np.repeat(np.arange(len(rows)), rows)
     cell_row = np.repeat(np.arange(len(columns)), columns)
     cells = np.repeat(np.arange(len(grid)), along**2)
-    parts, part = along[cells], np.arange(len(cells)) - first_patches[cells]
+    parts, part = along[cells], np.arange(len(cells)) - first_pieces[cells]
     of_row = cell_row[cells]
     triangles = row_triangle[of_row]
 
@@ -136,7 +141,7 @@ def cut(scene: Scene, kernel: KernelScene, grid: Grid, along, seed: int) -> Patc
         size=grid.size,
         areas=grid.areas[triangles] * shares,
         triangles=triangles.astype(np.int32),
-        reflectance=_mean_reflectance(scene, kernel, triangles.astype(np.int32), seed),
+        reflectance=mean_reflectance(scene, kernel, triangles.astype(np.int32), seed),
         bounds=bounds.astype(np.float32),
         apexes=grid.apexes,
         cells=cells.astype(np.int32),
@@ -157,18 +162,33 @@ def _require_few(size, pieces, triangle_count):
 
 
 def patch_triangles(scene: Scene, patches: Patches, chosen):
-    """Two triangles that make up each chosen patch (K,), wound as its triangle: corners float64 (K, 2, 3, 3) [m]."""
+    """Triangles that make up chosen patches (K,), wound as the scene's: corners float64 (M, 3, 3) [m], and of which
+    of the chosen each is part, int64 (M,)."""
+    which = np.arange(len(chosen))
+    if patches.pieces is not None:
+        place = np.full(len(patches), -1)
+        place[chosen] = which
+        chosen = np.flatnonzero(place[patches.owners] >= 0)
+        which, patches = place[patches.owners[chosen]], patches.pieces
+    wide, narrow, first, second = patches.bounds[chosen].astype(np.float64).T
+    widths, shares = (wide, wide, narrow, narrow), (first, second, second, first)
+    a, b, c, d = (_points(scene, patches, chosen, *at) for at in zip(widths, shares))
+    return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]), np.tile(which, 2)
+
+
+def patch_middles(scene: Scene, patches: Patches, chosen):
+    """A point well inside of each chosen piece (K,), float64 (K, 3) [m]."""
+    wide, narrow, first, second = patches.bounds[chosen].astype(np.float64).T
+    return _points(scene, patches, chosen, (wide + narrow) / 2, (first + second) / 2)
+
+
+def _points(scene, patches, chosen, width, across):
+    """Points of chosen pieces (K,): ``width`` from the apex, ``across`` from the next corner to the one after."""
     triangles = patches.triangles[chosen]
-    corners, apexes = scene.corners[triangles], patches.apexes[triangles].astype(int)
-    rows = np.arange(len(triangles))
-    apex, left, right = (corners[rows, (apexes + k) % 3] for k in range(3))
-    wide, narrow, first, second = patches.bounds[chosen].astype(np.float64).T[:, :, None]
-
-    def point(width, across):
-        return (1 - width) * apex + width * ((1 - across) * left + across * right)
-
-    a, b, c, d = point(wide, first), point(wide, second), point(narrow, second), point(narrow, first)
-    return np.stack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)], axis=1)
+    corners, apexes, rows = scene.triangles[triangles], patches.apexes[triangles].astype(int), np.arange(len(triangles))
+    apex, left, right = (scene.vertices[corners[rows, (apexes + k) % 3]] for k in range(3))
+    width, across = width[:, None], across[:, None]
+    return (1 - width) * apex + width * ((1 - across) * left + across * right)
 
 
 def _apexes(scene):
@@ -183,7 +203,8 @@ def _offsets(counts):
     return np.concatenate([[0], np.cumsum(counts)])
 
 
-def _mean_reflectance(scene, kernel, triangles, seed):
+def mean_reflectance(scene: Scene, kernel: KernelScene, triangles, seed: int):
+    """Reflectance float32 (P, 3) of the kernel's patches, each of the material of one of its triangles (P,)."""
     factors = np.array([m.reflectance for m in scene.materials], np.float32).reshape(-1, 3)
     materials = scene.triangle_materials[triangles]
     reflectance = factors[materials]

@@ -12,12 +12,13 @@ from .decomposition import finer
 from .dense import require_direct_size, solve_direct
 from .emitters import LUMINANCE, Emitters
 from .exchange import exchange_of
+from .joined import joined
 from .kernel import KernelScene
 from .laws import Laws, measured_laws
 from .parted import finer_where_parted
 from .patch_light import QUICK_ERROR, PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
-from .patches import cut, grid_of, patch_size_for, subdivide, triangle_areas
+from .patches import Patches, cut, grid_of, patch_size_for, subdivide, triangle_areas
 from .progressive import solve_progressive
 from .scene import Scene
 from .settings import BakeSettings
@@ -32,8 +33,8 @@ PATCH_BUDGETS = {"direct": 1200, "conjugate-gradient": 5000, "progressive": 3000
 DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic, at the least, where errors larger than this are good enough
 COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
 ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
-LIGHTMAP_ERROR = QUICK_ERROR  # at the least, is good enough for patches where a lightmap has texels on
-MOST_AREA = 0.9  # of the scene: looks from texel to texel take off what patches have wrong, unless there are
+LIGHTMAP_ERROR = QUICK_ERROR  # at the least, is good enough for patches, and small ones are joined, where a lightmap
+MOST_AREA = 0.9  # has texels on so much of the scene: looks from one to the other mend the light, unless there are
 MANY_LIGHTS = 64  # or more (as in native/src/gather.c): where rays go on they take what patches have of these
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
@@ -68,23 +69,25 @@ class Solved:
 
 def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, on_step) -> Solved:
     """Subdivide, measure direct light on the patches, solve for the light that bounces."""
-    error = settings.error
-    if settings.target == "lightmap" and _target_share(scene) >= MOST_AREA and len(emitters) < MANY_LIGHTS:
-        error = max(error, LIGHTMAP_ERROR)
+    is_rough = settings.target == "lightmap" and _target_share(scene) >= MOST_AREA and len(emitters) < MANY_LIGHTS
+    light = scene, kernel, emitters, sky_map(scene), settings
     # half of the bar is kept for solving once more
-    solved = _solved(scene, kernel, emitters, settings, error, within(on_step, 0.0, 0.5))
-    if error > settings.error and len(solved.sources) > len(emitters):
+    solved, patches = _solved(*light, is_rough, within(on_step, 0.0, 0.5))
+    if is_rough and settings.error < LIGHTMAP_ERROR and len(solved.sources) > len(emitters):
         # receivers sample bright sides as lights: what is wrong with these no look takes off
         rays = solved.rays
-        solved = _solved(scene, kernel, emitters, settings, settings.error, within(on_step, 0.5, 0.5))
+        solved, patches = _solved(*light, False, within(on_step, 0.5, 0.5))
         solved = replace(solved, rays={stage: count + rays[stage] for stage, count in solved.rays.items()})
-    return solved
+    laws, law_rays = measured_laws(scene, kernel, patches, settings.seed)
+    return replace(solved, laws=laws, rays={**solved.rays, "laws": law_rays})
 
 
-def _solved(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, error, on_step) -> Solved:
-    """The same with patches that are good to about an error."""
+def _solved(
+    scene, kernel, emitters: Emitters, sky, settings: BakeSettings, is_rough, on_step
+) -> tuple[Solved, Patches]:
+    """The same without the laws, and the patches: those that a lightmap's texels mend are rough."""
+    error = max(settings.error, LIGHTMAP_ERROR) if is_rough else settings.error
     solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene))
-    sky = sky_map(scene)
 
     def measure(patches, on_step, known=None):
         return measure_patches(scene, kernel, patches, emitters, sky, error, settings.seed, known, on_step)
@@ -103,6 +106,8 @@ def _solved(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: Bak
         else:
             grid = grid_of(scene, patch_size_for(scene, budget), budget)
             patches = finer_where_parted(scene, kernel, grid, budget, settings.seed)
+            if is_rough:
+                patches = joined(scene, kernel, grid, patches, settings.seed)
         lit = measure(patches, within(on_step, 0.0, 0.4))
     else:
         lit = _decompose(scene, kernel, budget, error, settings.seed, measure, solve, within(on_step, 0.0, 0.4))
@@ -120,9 +125,8 @@ def _solved(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: Bak
         sky=sky,
     )
     sources = with_bright_sides(scene, kernel.centre, patches, emitters, solution.radiosity, bright)
-    laws, law_rays = measured_laws(scene, kernel, patches, settings.seed)
-    rays = {"patches": lit.rays, "solve": solution.rays, "laws": law_rays}
-    return Solved(field, emitters, sources, solution, laws, method, choice, rays)
+    rays = {"patches": lit.rays, "solve": solution.rays}
+    return Solved(field, emitters, sources, solution, Laws(), method, choice, rays), patches
 
 
 def _target_share(scene: Scene) -> float:

@@ -78,22 +78,29 @@ void pl_occluded(const pl_scene *scene, const double *from, const double *to, si
 
 /*
  * How triangles are cut into patches: rows parallel to the longest edge, cells across each row that run towards the
- * opposite corner, the apex; a cell is one patch, or a square number of them where more is to be told apart. A row's
- * cells have equal areas, a triangle's rows equal heights, so point -> patch and patch -> point are closed forms.
+ * opposite corner, the apex; a cell is one piece, or a square number of them where more is to be told apart. A row's
+ * cells have equal areas, a triangle's rows equal heights, so point -> piece and piece -> point are closed forms. A
+ * patch is one piece, or several that lie together, of many triangles each smaller than what is to be told apart.
  *
  *   apexes         triangle_count: which corner (0..2) is the apex
  *   first_rows     triangle_count + 1: triangle t has rows first_rows[t] .. first_rows[t + 1] - 1, row 0
  *                  along the longest edge
  *   first_cells    row_count + 1: row r has cells first_cells[r] .. first_cells[r + 1] - 1
- *   first_patches  cell_count + 1: cell c has patches first_patches[c] .. first_patches[c + 1] - 1, a square number,
+ *   first_pieces   cell_count + 1: cell c has pieces first_pieces[c] .. first_pieces[c + 1] - 1, a square number,
  *                  n times n, n at most PL_MOST_ALONG: n rows of equal height, in the order of the triangle's,
  *                  of n columns each
+ *   owners         one a piece: which patch it is part of, 0 .. patch_count - 1, each of which has one at least; NULL
+ *                  where piece i is patch i
+ *   areas          one a piece, of any unit, not read without owners
  */
 enum { PL_MOST_ALONG = 16 };
 typedef struct pl_patch_layout {
     const uint8_t *apexes;
-    const int32_t *first_rows, *first_cells, *first_patches;
+    const int32_t *first_rows, *first_cells, *first_pieces;
     size_t triangle_count, row_count, cell_count;
+    const int32_t *owners;
+    const float *areas;
+    size_t patch_count;
 } pl_patch_layout;
 typedef struct pl_patches pl_patches;
 pl_status pl_patches_create(const pl_patch_layout *layout, pl_patches **out_patches);

@@ -162,7 +162,7 @@ static PyMethodDef methods[] = {
     {"closest_hits", closest_hits, METH_VARARGS, "closest_hits(scene, origins, directions, out_triangles, out_hits)"},
     {"occluded", occluded, METH_VARARGS, "occluded(scene, points_from, points_to, out_occluded)"},
     {"create_patches", door_create_patches, METH_VARARGS,
-     "create_patches(apexes, first_rows, first_cells, first_patches) -> patches"},
+     "create_patches(apexes, first_rows, first_cells, first_pieces, owners, areas, patch_count) -> patches"},
     {"patch_points", door_patch_points, METH_VARARGS,
      "patch_points(layout, patches, samples, seed, out_triangles, out_barycentrics)"},
     {"sobol_points", door_sobol_points, METH_VARARGS, "sobol_points(first, seed, out_points)"},

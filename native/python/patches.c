@@ -7,29 +7,36 @@
 static void destroy_patches(PyObject *capsule) { pl_patches_destroy(PyCapsule_GetPointer(capsule, PATCHES)); }
 
 PyObject *door_create_patches(PyObject *self, PyObject *args) {
-    PyObject *objects[4];
+    PyObject *objects[6];
     pl_patches *patches = NULL;
+    Py_ssize_t patch_count;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOO", &objects[0], &objects[1], &objects[2], &objects[3]))
+    if (!PyArg_ParseTuple(args, "OOOOOOn", &objects[0], &objects[1], &objects[2], &objects[3], &objects[4], &objects[5],
+                          &patch_count))
         return NULL;
-    door_array arrays[] = {{"apexes", 'B', 1, -1, false, {0}},
-                           {"first_rows", 'i', 1, -1, false, {0}},
-                           {"first_cells", 'i', 1, -1, false, {0}},
-                           {"first_patches", 'i', 1, -1, false, {0}}};
-    if (!door_arrays(objects, arrays, 4))
+    door_array arrays[] = {{"apexes", 'B', 1, -1, false, {0}},      {"first_rows", 'i', 1, -1, false, {0}},
+                           {"first_cells", 'i', 1, -1, false, {0}}, {"first_pieces", 'i', 1, -1, false, {0}},
+                           {"owners", 'i', 1, -1, false, {0}},      {"areas", 'f', 1, AS_MANY_ROWS_AS(4), false, {0}}};
+    if (!door_arrays(objects, arrays, 6))
         return NULL;
     pl_status status = PL_ERR_ARGUMENT;
-    if (door_rows(&arrays[1]) == door_rows(&arrays[0]) + 1 && door_rows(&arrays[2]) > 0 && door_rows(&arrays[3]) > 0) {
+    const size_t cell_ends = door_rows(&arrays[3]), owner_count = door_rows(&arrays[4]);
+    const int32_t *first_pieces = arrays[3].view.buf;
+    if (door_rows(&arrays[1]) == door_rows(&arrays[0]) + 1 && door_rows(&arrays[2]) > 0 && cell_ends > 0 &&
+        (!owner_count || (int64_t)owner_count == first_pieces[cell_ends - 1]) && patch_count >= 0) {
         const pl_patch_layout layout = {.apexes = arrays[0].view.buf,
                                         .first_rows = arrays[1].view.buf,
                                         .first_cells = arrays[2].view.buf,
-                                        .first_patches = arrays[3].view.buf,
+                                        .first_pieces = first_pieces,
                                         .triangle_count = door_rows(&arrays[0]),
                                         .row_count = door_rows(&arrays[2]) - 1,
-                                        .cell_count = door_rows(&arrays[3]) - 1};
+                                        .cell_count = cell_ends - 1,
+                                        .owners = owner_count ? arrays[4].view.buf : NULL,
+                                        .areas = arrays[5].view.buf,
+                                        .patch_count = (size_t)patch_count};
         status = pl_patches_create(&layout, &patches);
     }
-    door_release(arrays, 4);
+    door_release(arrays, 6);
     return status == PL_OK ? PyCapsule_New(patches, PATCHES, destroy_patches) : door_result(status);
 }
 

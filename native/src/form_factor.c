@@ -31,14 +31,12 @@ pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *p
     memset(out_rows, 0, sizeof(double) * side_count * count);
     for (size_t i = 0; i < count; ++i) {
         const size_t side = (size_t)sides[i];
-        const pl_side_frame frame = side_frame(scene, patches, side);
         const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
         for (uint32_t k = 0; k < rays; ++k) {
-            const vec3 origin =
-                side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
+            const pl_side_point from = side_point(scene, patches, side, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
             const vec3 direction =
-                cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), frame.u, frame.v, frame.normal);
-            deposit(scene, patches, origin, direction, 1 / (double)rays, out_rows + i * side_count);
+                cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), from.u, from.v, from.normal);
+            deposit(scene, patches, from.origin, direction, 1 / (double)rays, out_rows + i * side_count);
         }
     }
     return PL_OK;
@@ -89,17 +87,18 @@ static double hemicube_sum(uint32_t resolution, pixel_point at) {
     return sum;
 }
 
-static void hemicube_at(const pl_scene *scene, const pl_patches *patches, vec3 origin, const pl_side_frame *frame,
-                        float turn, pixel_point at, uint32_t resolution, double share, double *row) {
+static void hemicube_at(const pl_scene *scene, const pl_patches *patches, const pl_side_point *from, float turn,
+                        pixel_point at, uint32_t resolution, double share, double *row) {
     const float cosine = cosf(turn), sine = sinf(turn);
-    const vec3 u = vec3_mul_add(frame->u, cosine, vec3_scale(frame->v, sine));
-    const vec3 v = vec3_mul_add(frame->v, cosine, vec3_scale(frame->u, -sine));
+    const vec3 u = vec3_mul_add(from->u, cosine, vec3_scale(from->v, sine));
+    const vec3 v = vec3_mul_add(from->v, cosine, vec3_scale(from->u, -sine));
     const double normalised = share / hemicube_sum(resolution, at);
     for (uint32_t k = 0; k < 3 * resolution * resolution; ++k) {
         vec3 local;
         const float delta = hemicube_pixel(k, resolution, at, &local);
         const vec3 across = vec3_mul_add(u, local.x, vec3_scale(v, local.y));
-        deposit(scene, patches, origin, vec3_mul_add(frame->normal, local.z, across), (double)delta * normalised, row);
+        deposit(scene, patches, from->origin, vec3_mul_add(from->normal, local.z, across), (double)delta * normalised,
+                row);
     }
 }
 
@@ -111,17 +110,14 @@ pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patc
     memset(out_rows, 0, sizeof(double) * side_count * count);
     for (size_t i = 0; i < count; ++i) {
         const size_t side = (size_t)sides[i];
-        const pl_side_frame frame = side_frame(scene, patches, side);
         const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
         /* a fifth coordinate, of a sequence of its own */
         const uint32_t fifth_seed = hash_pair(side_seed, 4);
         for (uint32_t k = 0; k < positions; ++k) {
-            const vec3 origin =
-                side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
+            const pl_side_point from = side_point(scene, patches, side, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
             const float turn = 2 * PL_PI * sobol(k, 2, side_seed);
             const pixel_point at = {sobol(k, 3, side_seed), sobol(k, 0, fifth_seed)};
-            hemicube_at(scene, patches, origin, &frame, turn, at, resolution, 1 / (double)positions,
-                        out_rows + i * side_count);
+            hemicube_at(scene, patches, &from, turn, at, resolution, 1 / (double)positions, out_rows + i * side_count);
         }
     }
     return PL_OK;

@@ -40,25 +40,23 @@ void pl_shoot(const pl_scene *scene, const pl_patches *patches, const int32_t *s
     if (!count)
         return;
     size_t i = owner_of_ray(first_rays, side_count, first), side = (size_t)sides[i];
-    pl_side_frame frame = side_frame(scene, patches, side);
 
     for (uint64_t ray = first; ray < first + count; ++ray) {
         if (ray >= first_rays[i + 1]) {
             i = owner_of_ray(first_rays, side_count, ray);
             side = (size_t)sides[i];
-            frame = side_frame(scene, patches, side);
         }
         const uint32_t side_seed = hash_pair(seed, (uint32_t)side);
         const uint32_t k = first_samples[i] + (uint32_t)(ray - first_rays[i]);
-        const vec3 origin = side_origin(scene, patches, side, &frame, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
+        const pl_side_point from = side_point(scene, patches, side, sobol(k, 0, side_seed), sobol(k, 1, side_seed));
         const vec3 direction =
-            cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), frame.u, frame.v, frame.normal);
+            cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), from.u, from.v, from.normal);
 
-        const pl_hit hit = closest_hit(scene, origin, direction, 0);
+        const pl_hit hit = closest_hit(scene, from.origin, direction, 0);
         uint64_t flux[3];
         memcpy(flux, ray_flux + 3 * i, sizeof flux);
         if (scene->clear.bvh)
-            tint_flux(scene, origin, direction, hit.distance, flux);
+            tint_flux(scene, from.origin, direction, hit.distance, flux);
         add_flux(hit.triangle < 0 ? io_escaped : io_received + 3 * hit_side(patches, &hit), flux);
     }
 }

@@ -38,7 +38,7 @@ def sound_meshes(draw):
 
 @st.composite
 def kernels(draw):
-    """(scene, patches, number of patches), or None where the scene was refused."""
+    """(scene, patches, number of patches, of triangles), or None where the scene was refused."""
     points, triangles = draw(sound_meshes())
     clear = draw(st.sampled_from((None, None, 0.5)))
     clear = None if clear is None else np.full((len(triangles), 3), clear, np.float32)
@@ -52,9 +52,13 @@ def kernels(draw):
     first_rows = np.concatenate([[0], np.cumsum(rows)]).astype(np.int32)
     columns = np.resize([1, 3, 2], first_rows[-1])
     first_cells = np.concatenate([[0], np.cumsum(columns)]).astype(np.int32)
-    first_patches = np.concatenate([[0], np.cumsum(np.resize([1, 4, 1, 9], first_cells[-1]))]).astype(np.int32)
+    first_pieces = np.concatenate([[0], np.cumsum(np.resize([1, 4, 1, 9], first_cells[-1]))]).astype(np.int32)
     apexes = np.resize(np.uint8([0, 1, 2]), len(triangles)).astype(np.uint8)
-    return scene, _kernel.create_patches(apexes, first_rows, first_cells, first_patches), int(first_patches[-1])
+    layout, pieces = (apexes, first_rows, first_cells, first_pieces), int(first_pieces[-1])
+    count = min(pieces, max(draw(st.sampled_from((pieces, pieces // 2, 1))), 1))
+    owners = np.zeros(0, np.int32) if count == pieces else np.arange(pieces, dtype=np.int32) % count
+    areas = np.resize(np.float32([1, 0, 1e-30, 1e30, np.nan]), len(owners))
+    return scene, _kernel.create_patches(*layout, owners, areas, count), count, len(triangles)
 
 
 def light_table(draw):
@@ -94,7 +98,7 @@ def test_form_factors_of_any_sides(data):
     kernel = data.draw(kernels())
     if kernel is None:
         return
-    scene, patches, count = kernel
+    scene, patches, count, _ = kernel
     sides = arrays(data.draw, data.draw(counts), np.int32, st.integers(0, max(2 * count - 1, 0)) | numbers)
     rows, seed = np.full((len(sides), 2 * count), np.nan), data.draw(seeds)
     rays, positions = data.draw(st.sampled_from((0, 1, 64))), data.draw(st.sampled_from((0, 1, 3)))
@@ -118,7 +122,7 @@ def test_points_and_openness_of_any_patches(data):
     kernel = data.draw(kernels())
     if kernel is None:
         return
-    scene, patches, count = kernel
+    scene, patches, count, _ = kernel
     chosen = arrays(data.draw, data.draw(counts), np.int32, st.integers(0, max(count - 1, 0)) | numbers)
     samples, first, many = data.draw(counts), data.draw(numbers), data.draw(numbers)
     triangles, weights = np.empty(len(chosen) * samples, np.int32), np.empty((len(chosen) * samples, 3), np.float32)
@@ -141,7 +145,7 @@ def test_all_flux_that_is_shot_lands_or_leaves(data):
     kernel = data.draw(kernels())
     if kernel is None:
         return
-    scene, patches, count = kernel
+    scene, patches, count, _ = kernel
     shooting = data.draw(counts)
     known = st.integers(0, max(2 * count - 1, 0))
     sides = arrays(data.draw, shooting, np.int32, known if data.draw(st.integers(0, 5)) else numbers)
@@ -205,7 +209,7 @@ def test_guides_are_learned_of_any_groups(data):
     kernel = data.draw(kernels())
     if kernel is None:
         return
-    scene, patches, count = kernel
+    scene, patches, count, _ = kernel
     light = np.ones((2 * count, 3), np.float32)
     field = (light, light, light[:count], np.zeros(2 * count, np.uint8), light[:, 0].copy(), light[:1])
     many = data.draw(counts)
@@ -231,7 +235,7 @@ def test_gathered_light_of_any_solution(data):
     kernel = data.draw(kernels())
     if kernel is None:
         return
-    scene, patches, count = kernel
+    scene, patches, count, _ = kernel
     values = st.sampled_from((0.0, 1.0, 1e17))
     radiosity = arrays(data.draw, (2 * count, 3), np.float32, values)
     field = (
@@ -327,4 +331,4 @@ def test_patches_of_another_scene_are_refused(kernel, other):
     except ValueError as error:
         assert "patches" in str(error)  # noqa: PT017
     else:
-        assert count == kernel[2]
+        assert other[3] == kernel[3]

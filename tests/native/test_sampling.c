@@ -140,31 +140,39 @@ static void bases_are_orthonormal(void) {
     }
 }
 
-/* Four triangles in rows of cells, every third of them of 2 x 2 patches, every fifth of 3 x 3. */
-static pl_patches *cut_up(void) {
-    enum { CELLS = 35 };
+enum { CELLS = 35, MOST_PIECES = 9 * CELLS };
+
+/* Four triangles in rows of cells, every third of them of 2 x 2 pieces, every fifth of 3 x 3; patches of as many
+ * pieces as `joined`, from all over, but for the last ones. */
+static pl_patches *cut_up(int32_t joined) {
     const uint8_t apexes[] = {0, 1, 2, 1};
     const int32_t rows[] = {0, 1, 4, 9, 10}, cells[] = {0, 1, 6, 9, 10, 17, 23, 28, 31, 32, CELLS};
-    int32_t first_patches[CELLS + 1] = {0};
+    int32_t first_pieces[CELLS + 1] = {0}, owners[MOST_PIECES];
+    float areas[MOST_PIECES];
     for (int cell = 0; cell < CELLS; ++cell)
-        first_patches[cell + 1] = first_patches[cell] + (cell % 5 == 0 ? 9 : cell % 3 == 0 ? 4 : 1);
-    const pl_patch_layout layout = {apexes, rows, cells, first_patches, 4, 10, CELLS};
+        first_pieces[cell + 1] = first_pieces[cell] + (cell % 5 == 0 ? 9 : cell % 3 == 0 ? 4 : 1);
+    const int32_t count = (first_pieces[CELLS] + joined - 1) / joined;
+    for (int32_t piece = 0; piece < first_pieces[CELLS]; ++piece) {
+        owners[piece] = piece % count;
+        areas[piece] = (float)(1 + piece % 7);
+    }
+    const pl_patch_layout layout = {apexes, rows,         cells, first_pieces, 4, 10, CELLS, joined > 1 ? owners : NULL,
+                                    areas,  (size_t)count};
     pl_patches *patches = NULL;
     CHECK(pl_patches_create(&layout, &patches) == PL_OK);
     return patches;
 }
 
 /* Round trip: a point of a patch is found in that patch. */
-static void points_come_back_to_their_patch(void) {
-    pl_patches *patches = cut_up();
+static void points_come_back_to_their_patch(int32_t joined) {
+    pl_patches *patches = cut_up(joined);
     uint32_t strayed = 0, tried = 0;
     for (size_t patch = 0; patch < patches->patch_count; ++patch)
-        for (uint32_t k = 0; k < 4096; ++k) {
-            const pl_barycentric b = point_in_patch(patches, patch, sobol(k, 0, hash(3)), sobol(k, 1, hash(3)));
-            const int32_t triangle = patch_triangle(patches, patch);
-            CHECK(b.weight_1 >= 0 && b.weight_2 >= 0 && b.weight_1 + b.weight_2 <= 1.000001f);
+        for (uint32_t k = 0; k < 4096 * (uint32_t)joined; ++k) {
+            const pl_patch_point p = point_in_patch(patches, patch, sobol(k, 0, hash(3)), sobol(k, 1, hash(3)));
+            CHECK(p.weight_1 >= 0 && p.weight_2 >= 0 && p.weight_1 + p.weight_2 <= 1.000001f);
             ++tried;
-            if (patch_at(patches, triangle, b.weight_1, b.weight_2) != (int32_t)patch)
+            if (patch_at(patches, p.triangle, p.weight_1, p.weight_2) != (int32_t)patch)
                 ++strayed;
         }
     /* only points within rounding of a border may: borders are some 10 ulp wide, 1e-6 of the points, and off the
@@ -174,17 +182,56 @@ static void points_come_back_to_their_patch(void) {
 }
 
 /* A wall may stand on any edge: no point rounds to beyond it, whatever the numbers drawn. */
-static void points_keep_off_the_edges_of_their_triangle(void) {
+static void points_keep_off_the_edges_of_their_triangle(int32_t joined) {
     const float drawn[] = {0, 0x1p-32f, 0x1p-24f, 0.5f, 1 - 0x1p-24f};
-    pl_patches *patches = cut_up();
+    pl_patches *patches = cut_up(joined);
     for (size_t patch = 0; patch < patches->patch_count; ++patch)
         for (int i = 0; i < 5; ++i)
             for (int j = 0; j < 5; ++j) {
-                const pl_barycentric b = point_in_patch(patches, patch, drawn[i], drawn[j]);
-                const float least = fminf(fminf(b.weight_1, b.weight_2), 1 - b.weight_1 - b.weight_2);
+                const pl_patch_point p = point_in_patch(patches, patch, drawn[i], drawn[j]);
+                const float least = fminf(fminf(p.weight_1, p.weight_2), 1 - p.weight_1 - p.weight_2);
                 CHECK(least > 0x1p-19f); /* positions about as large as the triangle round by 2^-24 of it */
             }
     pl_patches_destroy(patches);
+}
+
+/* Of a patch of several pieces each gets points by its area. */
+static void pieces_of_a_patch_are_met_by_their_areas(void) {
+    enum { POINTS = 1 << 14 };
+    pl_patches *patches = cut_up(5);
+    for (size_t patch = 0; patch < patches->patch_count; ++patch) {
+        const int32_t first = patches->first_members[patch], end = patches->first_members[patch + 1];
+        int32_t met[MOST_PIECES] = {0};
+        double area = 0;
+        for (uint32_t k = 0; k < POINTS; ++k) {
+            const pl_patch_point p = point_in_patch(patches, patch, sobol(k, 0, hash(5)), sobol(k, 1, hash(5)));
+            ++met[piece_at(patches, p.triangle, p.weight_1, p.weight_2)];
+        }
+        CHECK(end - first == 4 || end - first == 5);
+        for (int32_t k = first; k < end; ++k)
+            area += 1 + patches->members[k] % 7;
+        for (int32_t k = first; k < end; ++k) {
+            const double expected = POINTS * (1 + patches->members[k] % 7) / area;
+            /* stratified: a point or two at either border; and few that rounding moves over the border of a piece */
+            CHECK(fabs(met[patches->members[k]] - expected) < 6);
+        }
+    }
+    pl_patches_destroy(patches);
+}
+
+static void owners_that_do_not_fit_are_refused(void) {
+    const uint8_t apexes[] = {0, 0};
+    const int32_t one_each[] = {0, 1, 2}, owners[][2] = {{0, 0}, {0, -1}, {0, 2}, {1, 0}};
+    const float areas[] = {1, 1};
+    for (int i = 0; i < 4; ++i)
+        for (size_t count = 0; count < 4; ++count) {
+            const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 2, 2, 2, owners[i], areas, count};
+            const bool fits = (i == 0 && count == 1) || (i == 3 && count == 2);
+            pl_patches *patches = NULL;
+            CHECK(pl_patches_create(&layout, &patches) == (fits ? PL_OK : PL_ERR_ARGUMENT));
+            if (fits)
+                pl_patches_destroy(patches);
+        }
 }
 
 int main(void) {
@@ -193,7 +240,11 @@ int main(void) {
     a_point_is_uniform_over_seeds();
     directions_follow_the_cosine();
     bases_are_orthonormal();
-    points_come_back_to_their_patch();
-    points_keep_off_the_edges_of_their_triangle();
+    points_come_back_to_their_patch(1);
+    points_come_back_to_their_patch(5);
+    points_keep_off_the_edges_of_their_triangle(1);
+    points_keep_off_the_edges_of_their_triangle(5);
+    pieces_of_a_patch_are_met_by_their_areas();
+    owners_that_do_not_fit_are_refused();
     return 0;
 }

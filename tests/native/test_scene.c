@@ -74,7 +74,7 @@ static void rows_are_finite_and_closed(const pl_scene *scene) {
     const int32_t one_each[] = {0, 1, 2, 3, 4}, sides[] = {0, 2, 4, 6};
     pl_patches *patches = NULL;
     double factors[4 * SIDES];
-    const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 4, 4, 4};
+    const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 4, 4, 4, NULL, NULL, 0};
     CHECK(pl_patches_create(&layout, &patches) == PL_OK);
     for (int estimator = 0; estimator < 2; ++estimator) {
         const pl_status status = estimator ? pl_form_factors_hemicube(scene, patches, sides, 4, 8, 4, 1, factors)
@@ -107,7 +107,7 @@ static void form_factors_of_a_triangle_without_area_are_finite(const pl_embree *
     pl_patches *patches = NULL;
     double factors[16];
     CHECK(pl_scene_create(embree, vertices, 6, triangles, 2, NULL, &scene) == PL_OK);
-    const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 2, 2, 2};
+    const pl_patch_layout layout = {apexes, one_each, one_each, one_each, 2, 2, 2, NULL, NULL, 0};
     CHECK(pl_patches_create(&layout, &patches) == PL_OK);
     CHECK(pl_form_factors_monte_carlo(scene, patches, sides, 4, 64, 1, factors) == PL_OK);
     for (int k = 0; k < 16; ++k)

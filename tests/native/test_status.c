@@ -32,12 +32,16 @@ static void only_a_rising_layout_of_squares_is_taken(void) {
     const int32_t rows[] = {0, 1, 3}, cells[] = {0, 1, 3, 4}, ones[] = {0, 1, 2, 3, 4}, squares[] = {0, 1, 5, 14, 15};
     const int32_t late[] = {1, 2, 3}, empty[] = {0, 0, 3}, falling[] = {0, 4, 3}, few[] = {0, 1, 2};
     const int32_t bad_cells[] = {0, 2, 2, 4}, oblong[] = {0, 2, 3, 4, 5}, huge[] = {0, 289, 290, 291, 292};
-    const pl_patch_layout good = {apexes, rows, cells, ones, 2, 3, 4};
+    const pl_patch_layout good = {apexes, rows, cells, ones, 2, 3, 4, NULL, NULL, 0};
     const pl_patch_layout bad[] = {
-        {bad_apexes, rows, cells, ones, 2, 3, 4}, {apexes, late, cells, ones, 2, 3, 4},
-        {apexes, empty, cells, ones, 2, 3, 4},    {apexes, falling, cells, ones, 2, 3, 4},
-        {apexes, few, cells, ones, 2, 3, 4},      {apexes, rows, bad_cells, ones, 2, 3, 4},
-        {apexes, rows, cells, oblong, 2, 3, 4},   {apexes, rows, cells, huge, 2, 3, 4},
+        {bad_apexes, rows, cells, ones, 2, 3, 4, NULL, NULL, 0},
+        {apexes, late, cells, ones, 2, 3, 4, NULL, NULL, 0},
+        {apexes, empty, cells, ones, 2, 3, 4, NULL, NULL, 0},
+        {apexes, falling, cells, ones, 2, 3, 4, NULL, NULL, 0},
+        {apexes, few, cells, ones, 2, 3, 4, NULL, NULL, 0},
+        {apexes, rows, bad_cells, ones, 2, 3, 4, NULL, NULL, 0},
+        {apexes, rows, cells, oblong, 2, 3, 4, NULL, NULL, 0},
+        {apexes, rows, cells, huge, 2, 3, 4, NULL, NULL, 0},
     };
     pl_patches *patches = NULL;
 
@@ -47,7 +51,7 @@ static void only_a_rising_layout_of_squares_is_taken(void) {
     CHECK(pl_patches_create(&good, &patches) == PL_OK);
     CHECK(pl_patches_count(patches) == 4);
     pl_patches_destroy(patches);
-    const pl_patch_layout split = {apexes, rows, cells, squares, 2, 3, 4};
+    const pl_patch_layout split = {apexes, rows, cells, squares, 2, 3, 4, NULL, NULL, 0};
     CHECK(pl_patches_create(&split, &patches) == PL_OK);
     CHECK(pl_patches_count(patches) == 15);
 
