@@ -132,7 +132,7 @@ def test_smoothing_keeps_the_light_that_few_rays_found():
     assert values.std() < 0.3 * found.mean(axis=1).std()
 
 
-@pytest.mark.parametrize(("bright", "dim"), [(1e6, 1e-12), (1e17, 1e-30)])
+@pytest.mark.parametrize(("bright", "dim"), [(1e6, 1e-12), (1e17, 1e-32)])
 def test_what_is_kept_leaves_the_dark_dark(bright, dim):
     """Sums beside what is bright are rounded by more than the dim there is: that is changed by half at the most."""
     side = 64
@@ -143,7 +143,8 @@ def test_what_is_kept_leaves_the_dark_dark(bright, dim):
     values = np.repeat(light[:, None], 3, axis=1).astype(np.float32)
     smooth_values = (values * rng.uniform(0.8, 1, (side * side, 1))).astype(np.float32)
     with np.errstate(over="raise", divide="raise", invalid="raise"):
-        restored = kept(grid, values, smooth_values, np.float32(light.max() ** 0.5) * np.sqrt(light, dtype=np.float32))
+        # pooled, so that the dark has the noise of what is bright
+        restored = kept(grid, values, smooth_values, np.full(side * side, np.sqrt(bright), np.float32))
     ratios = restored[smooth_values > 0] / smooth_values[smooth_values > 0]
     assert (abs(ratios - 1) <= MOST_KEPT + 1e-6).all()
     assert (restored[smooth_values == 0] == 0).all()
