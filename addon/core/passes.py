@@ -66,9 +66,9 @@ class _Samples:
 
     def add(self, job: GatherJob, active, further, seed, on_step) -> None:
         """Trace ``further`` (N,) rays of every replicate at the ``active`` receivers (K,), those of a kind at once."""
-        done = 0.0
-        for first, count in np.unique(np.stack([self.taken[active], further[active]], axis=1), axis=0):
-            group = active[(self.taken[active] == first) & (further[active] == count)]
+        done, kinds = 0.0, self.taken[active] * (MOST_RAYS + 1) + further[active]
+        for kind in np.unique(kinds):
+            group, (first, count) = active[kinds == kind], divmod(kind, MOST_RAYS + 1)
             share = len(group) / len(active)
             self.rays += job.gather(group, int(first), int(count), seed, self.sums, within(on_step, done, share))
             done += share
