@@ -59,6 +59,24 @@ static void add_risen(const light_face *face, aimed_light *io_aimed) {
     }
 }
 
+/* Samples fall on triangles by the luminance of their radiance and their area or angle; false where none has any. */
+static bool share_out(aimed_light *io_aimed) {
+    float weight = 0;
+    for (size_t k = 0; k < io_aimed->count; ++k) {
+        risen_triangle *risen = io_aimed->triangles + k;
+        risen->share = luminance(risen->radiance) * (io_aimed->way == BY_ANGLE ? risen->angle : risen->area);
+        weight += risen->share;
+    }
+    if (!(weight > 0))
+        return false;
+    for (size_t k = 0; k < io_aimed->count; ++k) {
+        risen_triangle *risen = io_aimed->triangles + k;
+        risen->share /= weight;
+        scaled(risen->radiance, weight / luminance(risen->radiance), risen->sampled);
+    }
+    return true;
+}
+
 bool aim(const pl_lights *lights, size_t light, vec3 point, vec3 normal, bool once, aimed_light *out) {
     bool cut = false;
     float angle = 0;
@@ -81,15 +99,9 @@ bool aim(const pl_lights *lights, size_t light, vec3 point, vec3 normal, bool on
         angle += out->triangles[k].angle;
     if (angle > (once ? large_for_one : large_for_many))
         out->way = BY_ANGLE;
-    else if (cut)
+    else if (cut || lights->kinds[light] == PL_LIGHT_MESH) /* a rectangle as a whole is spread better */
         out->way = BY_AREA;
-    out->weight = 0;
-    for (size_t k = 0; k < out->count; ++k) {
-        const risen_triangle *risen = out->triangles + k;
-        out->weights[k] = luminance(risen->radiance) * (out->way == BY_ANGLE ? risen->angle : risen->area);
-        out->weight += out->weights[k];
-    }
-    return out->weight > 0;
+    return share_out(out);
 }
 
 void aimed_exact(const aimed_light *aimed, float out_rgb[3]) {
@@ -100,13 +112,13 @@ void aimed_exact(const aimed_light *aimed, float out_rgb[3]) {
         out_rgb[c] = bounded(out_rgb[c]);
 }
 
-/* The triangle whose share of the weights x falls into; x becomes its place in that share. */
+/* The triangle whose share x falls into; x becomes its place in that share. */
 static const risen_triangle *choose_risen(const aimed_light *aimed, float *io_x) {
-    float passed = *io_x * aimed->weight;
+    float passed = *io_x;
     size_t k = 0;
-    while (k + 1 < aimed->count && passed >= aimed->weights[k])
-        passed -= aimed->weights[k++];
-    *io_x = lesser(greater(passed / greater(aimed->weights[k], 1e-30f), 0), 1);
+    while (k + 1 < aimed->count && passed >= aimed->triangles[k].share)
+        passed -= aimed->triangles[k++].share;
+    *io_x = lesser(greater(passed / greater(aimed->triangles[k].share, 1e-30f), 0), 1);
     return aimed->triangles + k;
 }
 
@@ -127,8 +139,7 @@ static bool sample_by_area(const aimed_light *aimed, float x, float y, pl_light_
         return false;
     /* cosines are heights by the distance, of which each takes one off the square law */
     const float inverse_square = 1 / vec3_dot(out->direction, out->direction);
-    const float factor = height * inverse_square * (lamp_height * inverse_square);
-    scaled(risen->radiance, factor * (aimed->weight / luminance(risen->radiance)), out->irradiance);
+    scaled(risen->sampled, height * inverse_square * (lamp_height * inverse_square), out->irradiance);
     for (int c = 0; c < 3; ++c)
         out->irradiance[c] = bounded(out->irradiance[c]);
     return true;
@@ -185,7 +196,7 @@ static bool sample_by_angle(const aimed_light *aimed, float x, float y, pl_light
         return false;
     const float distance = vec3_dot(vec3_sub(risen->a, aimed->point), risen->normal) / slope;
     aim_at(aimed, risen, vec3_mul_add(direction, distance, aimed->point), out);
-    scaled(risen->radiance, cosine * (aimed->weight / luminance(risen->radiance)) / density, out->irradiance);
+    scaled(risen->sampled, cosine / density, out->irradiance);
     return true;
 }
 

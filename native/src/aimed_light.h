@@ -11,8 +11,9 @@ enum { MOST_RISEN = 2 * EXACT_TRIANGLES };
 typedef struct risen_triangle {
     vec3 a, ab, ac, normal; /* unit, towards the receiver */
     float area, radiance[3];
-    vec3 seen[3]; /* unit directions to its corners */
-    float angle;  /* [sr] */
+    float share, sampled[3]; /* of the lamp's weight, and the radiance over it: what one sample stands for */
+    vec3 seen[3];            /* unit directions to its corners */
+    float angle;             /* [sr] */
 } risen_triangle;
 
 /*
@@ -29,8 +30,6 @@ typedef struct aimed_light {
     enum { BY_LIGHT, BY_AREA, BY_ANGLE } way;
     size_t count;
     risen_triangle triangles[MOST_RISEN];
-    float weights[MOST_RISEN]; /* of the triangles: luminance of radiance by area or angle */
-    float weight;              /* their sum */
 } aimed_light;
 
 /* For one sample or many; false where the light gives the receiver nothing. */

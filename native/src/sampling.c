@@ -4,16 +4,11 @@
 #include "patchlight.h"
 
 /*
- * Direction numbers of dimensions 1..3 with their bits reversed, so that scrambling needs no reversal
- * first: bit k of the index switches column k. Dimension 0 is the radical inverse: index bit k sets bit
- * 31 - k, reversed bit k.
+ * Direction numbers of dimensions 2 and 3 with their bits reversed, so that scrambling needs no reversal
+ * first: bit k of the index switches column k.
  */
 enum { DIMENSIONS = 4, BITS = 32 };
-static const uint32_t directions[DIMENSIONS - 1][BITS] = {
-    {0x00000001u, 0x00000003u, 0x00000005u, 0x0000000fu, 0x00000011u, 0x00000033u, 0x00000055u, 0x000000ffu,
-     0x00000101u, 0x00000303u, 0x00000505u, 0x00000f0fu, 0x00001111u, 0x00003333u, 0x00005555u, 0x0000ffffu,
-     0x00010001u, 0x00030003u, 0x00050005u, 0x000f000fu, 0x00110011u, 0x00330033u, 0x00550055u, 0x00ff00ffu,
-     0x01010101u, 0x03030303u, 0x05050505u, 0x0f0f0f0fu, 0x11111111u, 0x33333333u, 0x55555555u, 0xffffffffu},
+static const uint32_t directions[DIMENSIONS - 2][BITS] = {
     {0x00000001u, 0x00000003u, 0x00000006u, 0x00000009u, 0x00000017u, 0x0000003au, 0x00000071u, 0x000000a3u,
      0x00000116u, 0x00000339u, 0x00000677u, 0x000009aau, 0x00001601u, 0x00003903u, 0x00007706u, 0x0000aa09u,
      0x00010117u, 0x0003033au, 0x00060671u, 0x000909a3u, 0x00171616u, 0x003a3939u, 0x00717777u, 0x00a3aaaau,
@@ -24,13 +19,11 @@ static const uint32_t directions[DIMENSIONS - 1][BITS] = {
      0x0100011au, 0x030002a7u, 0x0400079eu, 0x0a000b6du, 0x1f001001u, 0x2e003003u, 0x45004004u, 0xc900a00au},
 };
 
-uint32_t sobol_reversed(uint32_t index, int dimension) {
-    if (dimension == 0)
-        return index;
+uint32_t sobol_by_columns(uint32_t index, int dimension) {
     uint32_t point = 0;
     for (int k = 0; index; ++k, index >>= 1)
         if (index & 1u)
-            point ^= directions[dimension - 1][k];
+            point ^= directions[dimension - 2][k];
     return point;
 }
 

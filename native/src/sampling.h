@@ -43,8 +43,25 @@ static inline uint32_t scramble_reversed(uint32_t x, uint32_t seed) {
 
 static inline float unit_float(uint32_t x) { return (float)(x >> 8) * 5.9604644775390625e-8f; }
 
-/* Point `index` of Sobol's sequence in dimension 0..3, its 32 bits reversed. */
-uint32_t sobol_reversed(uint32_t index, int dimension);
+/* Point `index` of Sobol's sequence in dimension 2 or 3, its 32 bits reversed. */
+uint32_t sobol_by_columns(uint32_t index, int dimension);
+
+/*
+ * The same in any dimension. Dimension 0 is the radical inverse. Column k of dimension 1 is (1 + x)^k over GF(2), so
+ * the point is the index as a polynomial at x + 1: each coefficient takes those whose place has all of its bits.
+ */
+static inline uint32_t sobol_reversed(uint32_t index, int dimension) {
+    if (dimension > 1)
+        return sobol_by_columns(index, dimension);
+    if (dimension == 1) {
+        index ^= (index & 0xaaaaaaaau) >> 1;
+        index ^= (index & 0xccccccccu) >> 2;
+        index ^= (index & 0xf0f0f0f0u) >> 4;
+        index ^= (index & 0xff00ff00u) >> 8;
+        index ^= index >> 16;
+    }
+    return index;
+}
 
 /* Coordinate of a scrambled point in [0, 1). Each dimension needs a seed of its own. */
 static inline float sobol(uint32_t index, int dimension, uint32_t seed) {
