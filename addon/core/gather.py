@@ -19,7 +19,7 @@ from .radiosity import Solved
 from .receivers import Receivers
 from .relative import scale_of, scale_of_luminance
 from .smoothing import TexelGrid, blurred, pooled
-from .texel_light import TexelLight, split_where_blocked
+from .texel_light import split_where_blocked, texel_light
 from .workers import within
 
 LOOK_RAYS, TEXEL_LOOK_RAYS = 4, 1  # for a look at the light, which is blurred where there are texels
@@ -134,9 +134,8 @@ def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
 def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed, on_step):
     """The job whose rays see the texels' light, found by a first ``look`` and mended by others; the rays of these."""
     reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
-    cells = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
-    no_light = np.zeros((len(direct), 3), np.float32)
-    job = replace(job.looking_further(FAR), texel_light=TexelLight(grid.uvs, cells, no_light, reach))
+    is_split = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
+    job = replace(job.looking_further(FAR), texel_light=texel_light(grid.uvs, grid.receivers, is_split, reach))
     job, rays, share = job.seeing(grid, direct, look), 0, 1 / (LOOKS - 1)
     for again in range(1, LOOKS):
         look, traced = job.glimpse(TEXEL_LOOK_RAYS, seed + 1000 * again, within(on_step, (again - 1) * share, share))

@@ -60,7 +60,7 @@ class GatherJob:
     def seeing(self, grid: TexelGrid, direct, gathered) -> GatherJob:
         """The same whose rays see direct and gathered light (N, 3) on the texels."""
         radiosity = (grid.reflectance * (direct + gathered)).astype(np.float32)
-        return replace(self, texel_light=replace(self.texel_light, radiosity=radiosity))
+        return replace(self, texel_light=self.texel_light.showing(radiosity))
 
     def direct(self, samples, seed, on_step=None):
         """Direct light of ``samples`` shadow rays each, as KernelScene.direct gives it."""

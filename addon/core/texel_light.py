@@ -12,6 +12,7 @@ from .receivers import Receivers
 LIFT = 0.1  # texels above the surface, where it is looked for what stands on it
 SPREAD = 2  # texels that light is blurred over before rays see it
 BAND = 256  # rows of the grid at once
+NO_LIGHT = np.uint64((1 << 64) - 1)
 TOUCHING = 2.0  # texels: receivers that are further apart are not neighbours, though their texels are
 
 
@@ -22,15 +23,22 @@ class TexelLight:
     Attributes
     ----------
     uvs : float32 (T, 3, 2) of the scene's triangles' corners, in texels; NaN without a place
-    receivers : int32 (height, width) which receiver each texel is, -1 for none; -2 - r for receiver r, a split texel
-    radiosity : float32 (N, 3) reflected radiosity of the receivers [W/m^2]
+    receivers : int32 (height, width) which receiver each texel is, -1 for none
+    is_split : bool (height, width) whether rays that hit it go on, from however far they come
+    light : uint64 (height, width) reflected radiosity of the texels, as the kernel has it [W/m^2]
     reach : rays that hit from nearer go on [m]
     """
 
     uvs: np.ndarray
     receivers: np.ndarray
-    radiosity: np.ndarray
+    is_split: np.ndarray
+    light: np.ndarray
     reach: float
+
+    def showing(self, radiosity) -> TexelLight:
+        """The same with the reflected radiosity float32 (N, 3) of the receivers [W/m^2]."""
+        of_all = np.append(packed(radiosity), NO_LIGHT)
+        return replace(self, light=of_all[self.receivers] | self.is_split.astype(np.uint64) << np.uint64(63))
 
     def looking_further(self, factor: float) -> TexelLight:
         """The same for rays that go on from further away."""
@@ -38,16 +46,31 @@ class TexelLight:
 
     def arrays(self) -> tuple:
         """In the kernel's order, with the texels in a row (0 where no texel has a light of its own) and the reach."""
-        return self.uvs, self.receivers, self.radiosity, self.receivers.shape[1], self.reach
+        return self.uvs, self.light, self.light.shape[1], self.reach
 
 
-NO_TEXEL_LIGHT = TexelLight(
-    np.zeros((0, 3, 2), np.float32), np.zeros((0, 0), np.int32), np.zeros((0, 3), np.float32), 0.0
+def texel_light(uvs, receivers, is_split, reach: float) -> TexelLight:
+    """Texels without light as yet."""
+    return TexelLight(uvs, receivers, is_split, np.full(receivers.shape, NO_LIGHT), reach)
+
+
+NO_TEXEL_LIGHT = texel_light(
+    np.zeros((0, 3, 2), np.float32), np.zeros((0, 0), np.int32), np.zeros((0, 0), bool), reach=0.0
 )
 
 
+def packed(light):
+    """Light float32 (N, 3), none below 0, in one number each, uint64 (N,): floats without sign and last 10 bits.
+
+    Rounded to 6e-5 of it, half to either side.
+    """
+    bits = np.ascontiguousarray(light, np.float32).view(np.uint32).astype(np.uint64)
+    red, green, blue = ((bits + np.uint64(1 << 9)) >> np.uint64(10)).T
+    return red | green << np.uint64(21) | blue << np.uint64(42)
+
+
 def split_where_blocked(kernel: KernelScene, cells, receivers: Receivers, spacing: float):
-    """The grid ``cells`` of receivers, with those marked as split that have another receiver's light but not its view.
+    """Which texels of a grid ``cells`` of receivers have another receiver's light but not its view: bool (H, W).
 
     A wall as thin as nothing that stands on a floor keeps a lit texel's light from the dark one beside it, but not from
     rays that hit the lit one's dark half, nor from those that hit where light was blurred over both.
@@ -60,8 +83,7 @@ def split_where_blocked(kernel: KernelScene, cells, receivers: Receivers, spacin
             rows, columns = _blocked(kernel, cells[band], step, receivers, spacing)
             is_split[top + rows, columns] = True
             is_split[top + rows + step[0], columns + step[1]] = True
-    is_split = _widened(_widened(is_split, 0), 1)
-    return np.where(is_split & (cells >= 0), -2 - cells, cells).astype(np.int32)
+    return _widened(_widened(is_split, 0), 1) & (cells >= 0)
 
 
 def _blocked(kernel, cells, step, receivers, spacing):

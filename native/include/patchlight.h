@@ -254,9 +254,9 @@ typedef struct pl_solution {
  *
  *   uvs        6 * triangle_count, which is the scene's: corners in texels, as in pl_rasterise_texels; NaN without a
  *              place
- *   receivers  width * height: which receiver each texel is, -1 for none; -2 - r for receiver r where the texel lies on
- *              both sides of something thin: rays that hit it go on, from however far they come
- *   radiosity  3 * receiver_count: reflected radiosity
+ *   light      width * height: reflected radiosity in one number, as what it costs is to wait for the memory: three
+ *              float32 without sign and without their last 10 bits, red lowest. The highest bit marks texels on both
+ *              sides of something thin: rays that hit these go on, from however far they come. All bits: no light here
  *   reach      rays that hit from nearer [m] do not take a texel's light, which may lie half under something, but go on
  *
  * Backs have no texels: with these given, a receiver's ray that hits one first does not take its mean, but goes on.
@@ -264,10 +264,9 @@ typedef struct pl_solution {
  */
 typedef struct pl_texel_light {
     const float *uvs;
-    const int32_t *receivers;
+    const uint64_t *light;
     int32_t width, height;
-    const float *radiosity;
-    size_t triangle_count, receiver_count;
+    size_t triangle_count;
     float reach;
 } pl_texel_light;
 

@@ -45,7 +45,7 @@ static bool unpack(PyObject *tuple, Py_ssize_t count, PyObject **out_objects) {
 enum {
     SOLUTION_ARRAY_COUNT = 6,
     TEXELS_AT = SOLUTION_ARRAY_COUNT,
-    TEXEL_ARRAY_COUNT = 3,
+    TEXEL_ARRAY_COUNT = 2,
     LIGHTS_AT = TEXELS_AT + TEXEL_ARRAY_COUNT,
     RECEIVERS_AT = LIGHTS_AT + LIGHT_ARRAY_COUNT,
     GATHER_ARRAY_COUNT = RECEIVERS_AT + RECEIVER_ARRAY_COUNT
@@ -54,8 +54,8 @@ enum {
     {"radiosity", 'f', 3, sides, false, {0}}, {"direct", 'f', 3, sides, false, {0}},                                   \
         {"reflectance", 'f', 3, (sides) / 2, false, {0}}, {"kinds", 'B', 1, sides, false, {0}},                        \
         {"reaches", 'f', 1, sides, false, {0}}, {"sky", 'f', 3, -1, false, {0}},                                       \
-        {"texel_uvs", 'f', 6, -1, false, {0}}, {"texel_receivers", 'i', 1, -1, false, {0}},                            \
-        {"texel_radiosity", 'f', 3, -1, false, {0}}, LIGHT_ARRAYS(LIGHTS_AT), RECEIVER_ARRAYS(RECEIVERS_AT)
+        {"texel_uvs", 'f', 6, -1, false, {0}}, {"texel_light", 'Q', 1, -1, false, {0}}, LIGHT_ARRAYS(LIGHTS_AT),       \
+        RECEIVER_ARRAYS(RECEIVERS_AT)
 
 static pl_solution solution_of(const door_array *arrays) {
     const size_t texels = door_rows(&arrays[5]), side = (size_t)(sqrt((double)texels) + 0.5);
@@ -71,8 +71,7 @@ static pl_solution solution_of(const door_array *arrays) {
 /* `width` 0: no texel has a light of its own yet. */
 static pl_texel_light texels_of(const door_array *arrays, int32_t width, float reach) {
     const int32_t height = width > 0 ? (int32_t)(door_rows(&arrays[1]) / (size_t)width) : 0;
-    return (pl_texel_light){arrays[0].view.buf,    arrays[1].view.buf,    width, height, arrays[2].view.buf,
-                            door_rows(&arrays[0]), door_rows(&arrays[2]), reach};
+    return (pl_texel_light){arrays[0].view.buf, arrays[1].view.buf, width, height, door_rows(&arrays[0]), reach};
 }
 
 /* The tuples (solution, lights, receivers) into objects[0 .. GATHER_ARRAY_COUNT); false with an exception. */
@@ -109,10 +108,9 @@ PyObject *door_gather(PyObject *self, PyObject *args) {
     uint64_t traced = 0;
     pl_status status;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOO(OOOif)OOOOIIIIO", &capsules[0], &capsules[1], &tuples[0], &objects[TEXELS_AT],
-                          &objects[TEXELS_AT + 1], &objects[TEXELS_AT + 2], &width, &reach, &tuples[1], &tuples[2],
-                          &guide_arrays, &objects[SELECTED], &rays.replicates, &rays.first, &rays.count, &rays.seed,
-                          &objects[SUMS]))
+    if (!PyArg_ParseTuple(args, "OOO(OOif)OOOOIIIIO", &capsules[0], &capsules[1], &tuples[0], &objects[TEXELS_AT],
+                          &objects[TEXELS_AT + 1], &width, &reach, &tuples[1], &tuples[2], &guide_arrays,
+                          &objects[SELECTED], &rays.replicates, &rays.first, &rays.count, &rays.seed, &objects[SUMS]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = door_patches(scene, capsules[1]);
@@ -152,9 +150,9 @@ PyObject *door_learn_guides(PyObject *self, PyObject *args) {
     uint64_t traced = 0;
     pl_status status = PL_ERR_ARGUMENT;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOO(OOOif)OOOOnnIIO", &capsules[0], &capsules[1], &tuples[0], &objects[TEXELS_AT],
-                          &objects[TEXELS_AT + 1], &objects[TEXELS_AT + 2], &width, &reach, &tuples[1], &tuples[2],
-                          &objects[MEMBERS], &objects[FIRST_MEMBERS], &first, &count, &rays, &seed, &objects[MOMENTS]))
+    if (!PyArg_ParseTuple(args, "OOO(OOif)OOOOnnIIO", &capsules[0], &capsules[1], &tuples[0], &objects[TEXELS_AT],
+                          &objects[TEXELS_AT + 1], &width, &reach, &tuples[1], &tuples[2], &objects[MEMBERS],
+                          &objects[FIRST_MEMBERS], &first, &count, &rays, &seed, &objects[MOMENTS]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = door_patches(scene, capsules[1]);

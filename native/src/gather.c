@@ -73,19 +73,28 @@ static void sample_direct(gather_job *job, const pl_hit *hit, size_t side, ray_r
         io_sum[k] += rgb[k] * weight[k] * job->solution->reflectance[3 * (side / 2) + (size_t)k];
 }
 
-/* The radiosity of the texel that a ray hits, and whether it lies on both sides of something; NULL where there is none.
- */
-static const float *texel_hit(const pl_texel_light *texels, const pl_hit *hit, bool *out_is_split) {
+/* Of three floats in one number. */
+static float unpacked(uint64_t light, int channel) {
+    union {
+        uint32_t bits;
+        float number;
+    } made = {(uint32_t)(light >> (21 * channel) & 0x1fffff) << 10};
+    return made.number;
+}
+
+/* The radiosity of the texel that a ray hits, and whether it lies on both sides of something; false where there is
+ * none. */
+static bool texel_hit(const pl_texel_light *texels, const pl_hit *hit, float out_rgb[3], bool *out_is_split) {
     const float *uv = texels->uvs + 6 * (size_t)hit->triangle;
     const float u = uv[0] + hit->u * (uv[2] - uv[0]) + hit->v * (uv[4] - uv[0]);
     const float v = uv[1] + hit->u * (uv[3] - uv[1]) + hit->v * (uv[5] - uv[1]);
     if (!(u >= 0 && v >= 0 && u < (float)texels->width && v < (float)texels->height))
-        return NULL;
-    int32_t receiver = texels->receivers[(size_t)v * (size_t)texels->width + (size_t)u];
-    *out_is_split = receiver < -1;
-    if (*out_is_split)
-        receiver = -2 - receiver;
-    return receiver < 0 || (size_t)receiver >= texels->receiver_count ? NULL : texels->radiosity + 3 * (size_t)receiver;
+        return false;
+    const uint64_t light = texels->light[(size_t)v * (size_t)texels->width + (size_t)u];
+    for (int k = 0; k < 3; ++k)
+        out_rgb[k] = unpacked(light, k);
+    *out_is_split = light >> 63;
+    return light != UINT64_MAX;
 }
 
 /* Add what one ray sees to the sum. */
@@ -108,11 +117,12 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         const bool is_back = step == 0 ? sees_back(frame, direction, &hit) : hit.is_back;
         const bool is_last = step == MOST_STEPS - 1;
         bool is_split = false;
-        const float *seen = job->texels && !is_back ? texel_hit(job->texels, &hit, &is_split) : NULL;
-        const bool takes_texel = seen && ((hit.distance >= job->texels->reach && !is_split) || is_last);
+        float texel[3];
+        const bool has_texel = job->texels && !is_back && texel_hit(job->texels, &hit, texel, &is_split);
+        const bool takes_texel = has_texel && ((hit.distance >= job->texels->reach && !is_split) || is_last);
         /* most rays end here, before the patches are touched: what they cost is cache misses */
         if (takes_texel && !(skips_lights && job->has_bright_sides)) {
-            add(io_sum, seen, weight);
+            add(io_sum, texel, weight);
             return;
         }
         const size_t side = 2 * (size_t)patch_at(job->patches, hit.triangle, hit.u, hit.v) + is_back;
@@ -123,12 +133,12 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         const bool is_mixed = solution->kinds[side] == PL_SIDE_MIXED;
         /* a mean has what bright sides give: where these are lights, what is mixed cannot be put together of both */
         const bool is_far =
-            !seen && !goes_on && !(is_mixed && job->has_bright_sides) && hit.distance >= solution->reaches[side];
-        if (seen ? takes_texel : is_last || (is_far && !is_mixed)) {
-            add(io_sum, seen ? seen : solution->radiosity + 3 * side, weight);
+            !has_texel && !goes_on && !(is_mixed && job->has_bright_sides) && hit.distance >= solution->reaches[side];
+        if (has_texel ? takes_texel : is_last || (is_far && !is_mixed)) {
+            add(io_sum, has_texel ? texel : solution->radiosity + 3 * side, weight);
             return;
         }
-        skips_lights = is_mixed || ((seen || goes_on) && job->lights->count < MANY_LIGHTS);
+        skips_lights = is_mixed || ((has_texel || goes_on) && job->lights->count < MANY_LIGHTS);
         if (skips_lights)
             sample_direct(job, &hit, side, &random, weight, io_sum);
         else

@@ -30,7 +30,7 @@ from patchlight.core.settings import BakeSettings
 from patchlight.core.sky import with_suns
 from patchlight.core.smoothing import texel_grid
 from patchlight.core.sound_faces import sound_faces
-from patchlight.core.texel_light import TexelLight, split_where_blocked
+from patchlight.core.texel_light import split_where_blocked, texel_light
 from patchlight.core.texels import texels
 from patchlight.core.unwrap import unwrap
 from patchlight.core.workers import Workers
@@ -91,8 +91,8 @@ def kernels(scene, settings, workers, count):
     ones = np.ones((len(texel_map), 3), np.float32)
     receivers = everywhere.part(np.unique(np.linspace(0, len(texel_map) - 1, min(count, len(texel_map))).astype(int)))
     kernel = kernel_module.KernelScene(scene, workers)
-    cells = split_where_blocked(kernel, grid.receivers, everywhere, grid.spacing)
-    light = TexelLight(grid.uvs, cells, ones, NEAR * grid.spacing)
+    is_split = split_where_blocked(kernel, grid.receivers, everywhere, grid.spacing)
+    light = texel_light(grid.uvs, grid.receivers, is_split, NEAR * grid.spacing).showing(ones)
     solved = solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), settings, lambda done: None)
     guides, _ = learn_guides(kernel, solved.patches, light, solved.sources, receivers, 3)
     everyone = np.arange(len(receivers), dtype=np.uint32)

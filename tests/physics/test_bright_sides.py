@@ -14,7 +14,7 @@ from addon.core.receivers import surface_receivers
 from addon.core.scene import PointLight
 from addon.core.settings import BakeSettings
 from addon.core.smoothing import texel_grid
-from addon.core.texel_light import NO_TEXEL_LIGHT, TexelLight
+from addon.core.texel_light import NO_TEXEL_LIGHT, texel_light
 from addon.core.texels import texels
 from addon.core.unwrap import unwrap
 from tests.scenes import closed_box, kernel_of
@@ -29,7 +29,8 @@ def texels_of(scene):
     texel_map = texels(charts)
     receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
     grid = texel_grid(scene, charts, texel_map, receivers)
-    return receivers, TexelLight(grid.uvs, grid.receivers, np.zeros((len(receivers), 3), np.float32), reach=10.0)
+    light = texel_light(grid.uvs, grid.receivers, np.zeros(grid.receivers.shape, bool), reach=10.0)
+    return receivers, light.showing(np.zeros((len(receivers), 3), np.float32))
 
 
 @pytest.mark.parametrize("has_texels", [False, True], ids=["from patches", "from texel to texel"])
@@ -40,9 +41,9 @@ def test_bright_sides_as_lights_give_what_rays_find_of_them(has_texels):
         solved = solve_radiosity(scene, kernel, emitters, BakeSettings(error=0.02), lambda done: None)
         patches = solved.patches
         assert (patches.kinds == LIGHT).any()
-        receivers, texel_light = texels_of(scene)
+        receivers, light = texels_of(scene)
         weights, nowhere = np.ones(len(receivers), np.float32), no_guides(len(receivers))
-        job = GatherJob(kernel, solved, receivers, weights, nowhere, texel_light if has_texels else NO_TEXEL_LIGHT)
+        job = GatherJob(kernel, solved, receivers, weights, nowhere, light if has_texels else NO_TEXEL_LIGHT)
         job = job.part(np.arange(0, len(receivers), 8))
         unlit = replace(patches, kinds=np.where(patches.kinds == LIGHT, EVEN, patches.kinds).astype(np.uint8))
 

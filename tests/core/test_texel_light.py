@@ -1,0 +1,79 @@
+"""The light of texels, packed for the kernel: what is lost, what rays find of it, and where they go on."""
+
+import numpy as np
+import pytest
+
+from addon.core.emitters import emitters_of
+from addon.core.guides import no_guides
+from addon.core.patch_solution import EVEN, PatchSolution
+from addon.core.patches import subdivide
+from addon.core.receivers import surface_receivers
+from addon.core.settings import BakeSettings
+from addon.core.smoothing import texel_grid
+from addon.core.texel_light import NO_LIGHT, packed, texel_light
+from addon.core.texels import texels
+from addon.core.unwrap import unwrap
+from tests.scenes import closed_box, kernel_of
+
+
+def unpacked(light):
+    """As the header has it: three float32 without sign and without their last 10 bits, red lowest."""
+    fields = [(light >> np.uint64(21 * k)) & np.uint64((1 << 21) - 1) for k in range(3)]
+    return (np.stack(fields, axis=-1).astype(np.uint32) << np.uint32(10)).view(np.float32)
+
+
+def test_light_is_rounded_to_six_in_a_hundred_thousand_and_not_to_one_side():
+    rng = np.random.default_rng(0)
+    light = (10.0 ** rng.uniform(-30, 30, (10000, 3))).astype(np.float32)
+    relative = unpacked(packed(light)).astype(np.float64) / light - 1
+    # 13 bits of mantissa, rounded: half of the last one
+    assert np.abs(relative).max() <= 2.0**-14
+    # a mean of 30000 of a spread of 3e-5: four deviations
+    assert abs(relative.mean()) < 4 * 3e-5 / 30000**0.5
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, 1.5, 2.0**-149, 2.0**-126, 1e38])
+def test_dark_stays_dark_and_extremes_are_numbers(value):
+    found = unpacked(packed(np.full((1, 3), value, np.float32)))
+    assert np.isfinite(found).all()
+    # denormals have fewer bits: of what is smaller than 1e-38 some is lost
+    assert found == pytest.approx(value, rel=2.0**-14, abs=2.0**-126)
+    assert (found == 0).all() or value > 0
+
+
+def gathered_in_a_box(light, is_split):
+    """What receivers of a box see, (N, 3), whose texels have ``light`` (3,) and whose patches are dark."""
+    scene = closed_box()
+    charts = unwrap(scene, BakeSettings(texels=1024))
+    texel_map = texels(charts)
+    receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
+    grid = texel_grid(scene, charts, texel_map, receivers)
+    marks = np.full(grid.receivers.shape, is_split)
+    shown = texel_light(grid.uvs, grid.receivers, marks, 0.0).showing(np.tile(np.float32(light), (len(receivers), 1)))
+    assert (shown.light[grid.receivers < 0] == NO_LIGHT).all()
+    with kernel_of(scene) as kernel:
+        patches = subdivide(scene, kernel, 0.5, 1000, 0)
+        dark, count = np.zeros((2 * len(patches), 3), np.float32), 16
+        field = PatchSolution(
+            dark, dark, patches.reflectance, np.full(len(dark), EVEN, np.uint8), np.zeros(len(dark), np.float32),
+            np.zeros((1, 3), np.float32),
+        )  # fmt: skip
+        sums = np.zeros((len(receivers), 1, 3), np.float32)
+        everyone = np.arange(len(receivers), dtype=np.uint32)
+        kernel.gather(
+            field, shown, emitters_of(scene, kernel.centre), receivers, no_guides(len(receivers)), everyone, 1, 0,
+            count, 0, sums,
+        )  # fmt: skip
+    return sums[:, 0] / count
+
+
+def test_rays_find_the_light_of_texels():
+    light = (3.0, 0.7, 1e-6)
+    found = gathered_in_a_box(light, is_split=False)
+    # a few rays of the outermost receivers meet the border of a face, where no texel is
+    assert np.median(found, axis=0) == pytest.approx(light, rel=2.0**-14 + 1e-5)
+    assert found.mean(axis=0) == pytest.approx(light, rel=0.01)
+
+
+def test_rays_go_on_from_texels_that_are_split():
+    assert gathered_in_a_box((3.0, 0.7, 1.0), is_split=True).max() == 0
