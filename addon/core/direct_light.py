@@ -29,12 +29,14 @@ class DirectLight:
     variance : float32 (N,) of its luminance, as two replicates state it
     samples : int64 (N,) shadow rays that were meant for each
     rays : shadow rays traced
+    rms : what its relative noise comes to, once that is known
     """
 
     values: np.ndarray
     variance: np.ndarray
     samples: np.ndarray
     rays: int
+    rms: float = 0.0
 
 
 def shadow_samples(error: float) -> int:
@@ -62,11 +64,12 @@ def refined_direct(
     """
     values, variance, samples = first.values.copy(), first.variance.copy(), first.samples.copy()
     rays = first.rays
-    for attempt in range(1, PASSES + 1):
+    for attempt in range(1, PASSES + 2):
         of_one_ray = np.minimum(variance / scale**2, 1.0) * samples
         noise = np.sqrt(weights * np.minimum(pooled(of_one_ray) / samples, 1.0))
-        if np.sqrt(np.mean(noise**2)) <= SHARE * error:
-            break
+        rms = float(np.sqrt(np.mean(noise**2)))
+        if rms <= SHARE * error or attempt > PASSES:
+            return DirectLight(values, variance, samples, rays, rms)
         due = np.minimum(rays_due(noise, samples, SHARE * error, EVENNESS), MOST_SAMPLES)
         wanted = 2 ** np.ceil(np.log2(np.maximum(due, 1))).astype(np.int64)
         wanted[wanted < GROWTH * samples] = 0
@@ -83,4 +86,3 @@ def refined_direct(
             )
             samples[chosen] = count
             rays, begin = rays + traced, begin + share
-    return DirectLight(values, variance, samples, rays)

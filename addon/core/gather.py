@@ -87,21 +87,22 @@ def gather_irradiance(
     started = time.perf_counter()
     weights = grid.shown if grid else np.ones(len(receivers), np.float32)
     job = GatherJob(kernel, solved, receivers, weights, no_guides(len(receivers)))
-    direct, shadow_rays, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.35))
+    lit, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.35))
+    direct = lit.values
     if grid is not None:
         job, further = _with_texel_light(job, grid, direct, look, seed + 2, within(on_step, 0.35, 0.05))
         looks += further
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     job = replace(job, guides=guides)
-    pace = (shadow_rays + looks + learning) / (time.perf_counter() - started)
+    pace = (lit.rays + looks + learning) / (time.perf_counter() - started)
     passes = within(on_step, 0.4, 0.6)
-    gathered = gather_until(job, grid, direct, denoise, error, seed, pace, seconds_left, passes)
+    gathered = gather_until(job, grid, direct, lit.rms, denoise, error, seed, pace, seconds_left, passes)
     at_points = measure(gathered.job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
     # relative to what is there, not to what is shown: light that leaks into the dark has to count as all wrong
     scale = scale_of_luminance(at_points.luminance)
     seen_error = rms_of(at_points.squares_of(seen.look_up(gathered.values), scale))
     traced = {
-        "direct": shadow_rays,
+        "direct": lit.rays,
         "gather": looks + learning + gathered.rays,
         "probe": gathered.probe_rays + at_points.rays,
     }
@@ -110,7 +111,7 @@ def gather_irradiance(
 
 
 def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
-    """Direct light (N, 3) and its rays, what a few gather rays find (N, 3) and how many these were.
+    """Direct light, what a few gather rays find (N, 3) and how many these were.
 
     Direct light comes in two parts, as how much noise it may have depends on what else there is.
     """
@@ -128,7 +129,7 @@ def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
     scale = scale_of(first.values + look)
     rest = within(on_step, 0.5, 0.5)
     direct = refined_direct(first, trace, over_neighbours, scale, job.weights, error, seed, rest)
-    return direct.values, direct.rays, look, rays
+    return direct, look, rays
 
 
 def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed, on_step):

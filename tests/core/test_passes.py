@@ -1,8 +1,9 @@
-"""Passes of a gather: how many rays they begin with, may take, and what the last ones are for."""
+"""Passes of a gather: how many rays they begin with and may take, who gets them, and what stops them."""
 
 import numpy as np
 import pytest
 
+from addon.core.allocation import rays_due
 from addon.core.gather_job import REPLICATES
 from addon.core.passes import (
     AIM,
@@ -13,15 +14,13 @@ from addon.core.passes import (
     LEAST_FIRST,
     MOST_FIRST,
     MOST_RAYS,
-    SPECKLE_SHARE,
-    _due,
-    _Found,
+    STEP,
+    _gathered_part,
     _next,
     _Samples,
     first_rays,
     ray_budget,
 )
-from addon.core.probes import Measured, Probes
 
 COUNT = 4096
 
@@ -45,57 +44,50 @@ def test_a_budget_goes_by_the_square_of_a_small_error_and_has_a_least():
     assert ray_budget(1, 0.5) == FREE_RAYS
 
 
-def after_a_pass(noise, error_found, taken):
-    """What passes of so many rays found, of that stated noise (N,) and an RMS error as measured at every 8th."""
+def samples_of(taken):
     samples = _Samples(COUNT)
     samples.taken[:], samples.rays = taken, taken * REPLICATES * COUNT
-    chosen = np.arange(0, COUNT, 8)
-    measured = Measured(np.zeros(len(chosen)), np.zeros(len(chosen)), 0)
-    squares = np.full(len(chosen), error_found**2)
-    return _Found(np.zeros((COUNT, 3)), noise, squares), samples, Probes(chosen, np.ones(len(chosen)), measured)
+    return samples
 
 
-def next_of(noise, error_found, rays_left=1e12, rays_in_time=np.inf, aim=AIM, taken=8):
-    """What comes after it for a target of 0.02: samples so far, receivers, further rays, what stops it."""
-    found, samples, probes = after_a_pass(noise, error_found, taken)
-    due = _due(found, samples, probes, 0.02, aim)
-    return samples, *_next(due, samples, error_found <= 0.02, rays_left, rays_in_time)
-
-
-SPECKLED = np.where(np.arange(COUNT) % 32 == 0, 0.5, 0.001)
-
-
-def test_a_target_that_is_met_leaves_speckles_an_eighth_of_the_rays_at_the_most():
-    samples, active, further, stopped = next_of(SPECKLED, 0.01)
-    assert stopped is None
-    assert set(active) <= set(np.flatnonzero(SPECKLED > 0.1))
-    assert 0 < samples.cost * further[active].sum() <= SPECKLE_SHARE * samples.rays
+def next_of(errors, rays_left=1e12, rays_in_time=np.inf, aim=AIM, taken=8):
+    """What comes after errors (N,) for a target of 0.02: samples so far, receivers, further rays, what stops it."""
+    samples, rms = samples_of(taken), float(np.sqrt(np.mean(errors**2)))
+    errors, target = _gathered_part(errors, rms, aim * 0.02, 0.0)
+    return samples, *_next(rays_due(errors, samples.taken, target), samples, rays_left, rays_in_time)
 
 
 def test_a_target_missed_by_a_hair_is_gone_on_for():
     for aim in (AIM, DENOISED_AIM):
-        active, further = next_of(np.full(COUNT, 0.0201), 0.0201, aim=aim)[1:3]
+        active, further = next_of(np.full(COUNT, 0.0201), aim=aim)[1:3]
         assert len(active) == COUNT
         assert (further > 0).all()
 
 
+def test_rays_are_to_take_off_what_direct_light_leaves():
+    """Both parts' squares make up the error: with what is aimed at for gathered light, they come to the target."""
+    errors, direct = np.full(COUNT, 0.06), 0.015
+    part, target = _gathered_part(errors, 0.06, 0.02, direct)
+    assert np.hypot(part[0], direct) == pytest.approx(0.06)
+    assert np.hypot(target, direct) == pytest.approx(0.02)
+    # never nothing, and never a step so small that nobody is due much
+    assert _gathered_part(errors, 0.06, 0.02, 0.03)[1] == pytest.approx(0.01)
+    part, target = _gathered_part(np.full(COUNT, 0.0201), 0.0201, 0.02, direct)
+    assert target == pytest.approx(STEP * part[0])
+
+
 def test_who_can_wait_for_a_denoiser_takes_fewer_rays():
-    noise = np.linspace(0.01, 0.06, COUNT)
-    alone, denoised = (next_of(noise, 0.035, aim=aim)[2].sum() for aim in (AIM, DENOISED_AIM))
+    errors = np.linspace(0.01, 0.06, COUNT)
+    alone, denoised = (next_of(errors, aim=aim)[2].sum() for aim in (AIM, DENOISED_AIM))
     assert denoised < alone
 
 
-def test_a_target_that_is_met_is_stopped_by_nothing():
-    for noise, rays_left in ((np.full(COUNT, 0.001), 1e12), (np.full(COUNT, 0.5), 0)):
-        assert next_of(noise, 0.01, rays_left)[3] == ""
-
-
 def test_a_target_that_is_missed_names_what_ran_out():
-    noise = np.full(COUNT, 0.2)
-    assert next_of(noise, 0.2, 1)[3] == "by the budget of rays"
-    assert next_of(noise, 0.2, 1e12, 1)[3] == "by the time limit"
-    assert next_of(noise, 0.2, taken=MOST_RAYS)[3] == "as receivers have the most rays that they may"
-    _, active, further, stopped = next_of(noise, 0.2)
+    errors = np.full(COUNT, 0.2)
+    assert next_of(errors, 1)[3] == "by the budget of rays"
+    assert next_of(errors, 1e12, 1)[3] == "by the time limit"
+    assert next_of(errors, taken=MOST_RAYS)[3] == "as receivers have the most rays that they may"
+    _, active, further, stopped = next_of(errors)
     assert stopped is None
     assert len(active) == COUNT
     assert (further[active] >= 8).all()
@@ -103,11 +95,11 @@ def test_a_target_that_is_missed_names_what_ran_out():
 
 def test_a_pass_that_few_of_those_that_want_it_can_be_given_is_not_worth_it():
     # all are due some more, but when rays are short only the loudest are left, of whom there may be too few
-    samples = after_a_pass(np.zeros(COUNT), 0.1, 8)[1]
+    samples = samples_of(8)
     for share, expected in ((ENOUGH / 2, "by the budget of rays"), (2 * ENOUGH, None)):
         loud = np.arange(COUNT) < share * COUNT
         rays_left = REPLICATES * 16 * loud.sum()
-        active, further, stopped = _next(np.where(loud, 40.0, 12.0), samples, False, rays_left, np.inf)
+        active, further, stopped = _next(np.where(loud, 40.0, 12.0), samples, rays_left, np.inf)
         assert set(active) == set(np.flatnonzero(loud))
         assert samples.cost * further[active].sum() <= rays_left
         assert stopped == expected
