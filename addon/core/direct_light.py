@@ -13,10 +13,10 @@ from .workers import within
 FIRST = 1 / 4  # of the shadow rays of a penumbra, for the first look at direct light, ...
 LEAST_FIRST = 16  # ... but no fewer: with its neighbours' a receiver then has hundreds, and they know what is hidden
 MOST_SAMPLES = 4096
+WORTH = 0.25  # times the rays it has, further ones are for a receiver that goes on
 SHARE = 0.55  # of the error that direct light may have
-PASSES = 2  # after the first look; its noise says well what is due, and a second one mends what it missed
+PASSES = 3  # after the first look; its noise says well what is due, and others mend what it missed
 EVENNESS = 4 / 3  # shadow rays are spread so evenly that the square of their error falls as 1 / rays to this power
-GROWTH = 2  # times the rays it has, that a receiver must be due to go on
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class DirectLight:
     ----------
     values : float32 (N, 3) E [W/m^2]
     variance : float32 (N,) of its luminance, as two replicates state it
-    samples : int64 (N,) shadow rays that were meant for each
+    samples : float64 (N,) as many shadow rays at once would be as good as those of each
     rays : shadow rays traced
     rms : what its relative noise comes to, once that is known
     """
@@ -51,7 +51,7 @@ def first_direct(trace: Callable, error: float, seed: int, on_step: Callable[[fl
     """
     samples = max(int(FIRST * shadow_samples(error)), LEAST_FIRST)
     values, variance, rays = trace(slice(None), samples, seed, on_step)
-    return DirectLight(values, variance, np.full(len(values), samples), rays)
+    return DirectLight(values, variance, np.full(len(values), float(samples)), rays)
 
 
 def refined_direct(
@@ -71,18 +71,21 @@ def refined_direct(
         if rms <= SHARE * error or attempt > PASSES:
             return DirectLight(values, variance, samples, rays, rms)
         due = np.minimum(rays_due(noise, samples, SHARE * error, EVENNESS), MOST_SAMPLES)
-        wanted = 2 ** np.ceil(np.log2(np.maximum(due, 1))).astype(np.int64)
-        wanted[wanted < GROWTH * samples] = 0
+        further = np.maximum(due**EVENNESS - samples**EVENNESS, 1) ** (1 / EVENNESS)
+        wanted = 2 ** np.round(np.log2(further)).astype(np.int64)
+        wanted[wanted < WORTH * samples] = 0
         # half of what is left of the bar for each pass
         begin, width = 1 - 0.5 ** (attempt - 1), 0.5**attempt / max(wanted.sum(), 1)
         for count in np.unique(wanted[wanted > 0]):
             chosen = np.flatnonzero(wanted == count)
             share = width * count * len(chosen)
-            values[chosen], variance[chosen], traced = trace(
-                chosen,
-                int(count),
-                seed + 1000 * attempt,
-                within(on_step, begin, share),
+            again, its_variance, traced = trace(
+                chosen, int(count), seed + 1000 * attempt, within(on_step, begin, share)
             )
-            samples[chosen] = count
+            before, worth = samples[chosen] ** EVENNESS, count**EVENNESS
+            new = (worth / (worth + before)).astype(np.float32)
+            values[chosen] += new[:, None] * (again - values[chosen])
+            # by these alone: who goes on is who was found noisy, by chance as well
+            variance[chosen] = new * its_variance
+            samples[chosen] = (worth + before) ** (1 / EVENNESS)
             rays, begin = rays + traced, begin + share
