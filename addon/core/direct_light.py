@@ -47,10 +47,10 @@ def shadow_samples(error: float) -> int:
 def first_direct(trace: Callable, error: float, seed: int, on_step: Callable[[float], None]) -> DirectLight:
     """A first look at the direct light of all receivers.
 
-    ``trace`` is (chosen, samples, seed, on_step) -> what KernelScene.direct gives for the chosen receivers.
+    ``trace`` is (chosen, samples, seed, on_step, is_first) -> what KernelScene.direct gives for the chosen receivers.
     """
     samples = max(int(FIRST * shadow_samples(error)), LEAST_FIRST)
-    values, variance, rays = trace(slice(None), samples, seed, on_step)
+    values, variance, rays = trace(slice(None), samples, seed, on_step, True)
     return DirectLight(values, variance, np.full(len(values), float(samples)), rays)
 
 
@@ -68,19 +68,19 @@ def refined_direct(
         of_one_ray = np.minimum(variance / scale**2, 1.0) * samples
         noise = np.sqrt(weights * np.minimum(pooled(of_one_ray) / samples, 1.0))
         rms = float(np.sqrt(np.mean(noise**2)))
-        if rms <= SHARE * error or attempt > PASSES:
-            return DirectLight(values, variance, samples, rays, rms)
         due = np.minimum(rays_due(noise, samples, SHARE * error, EVENNESS), MOST_SAMPLES)
         further = np.maximum(due**EVENNESS - samples**EVENNESS, 1) ** (1 / EVENNESS)
         wanted = 2 ** np.round(np.log2(further)).astype(np.int64)
         wanted[wanted < WORTH * samples] = 0
+        if rms <= SHARE * error or attempt > PASSES or not wanted.any():
+            return DirectLight(values, variance, samples, rays, rms)
         # half of what is left of the bar for each pass
         begin, width = 1 - 0.5 ** (attempt - 1), 0.5**attempt / max(wanted.sum(), 1)
         for count in np.unique(wanted[wanted > 0]):
             chosen = np.flatnonzero(wanted == count)
             share = width * count * len(chosen)
             again, its_variance, traced = trace(
-                chosen, int(count), seed + 1000 * attempt, within(on_step, begin, share)
+                chosen, int(count), seed + 1000 * attempt, within(on_step, begin, share), False
             )
             before, worth = samples[chosen] ** EVENNESS, count**EVENNESS
             new = (worth / (worth + before)).astype(np.float32)

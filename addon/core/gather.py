@@ -116,8 +116,8 @@ def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
     Direct light comes in two parts, as how much noise it may have depends on what else there is.
     """
 
-    def trace(chosen, samples, seed, on_step):
-        return job.part(chosen).direct(samples, seed, on_step)
+    def trace(chosen, samples, seed, on_step, is_first):
+        return job.part(chosen).direct(samples, seed, on_step, is_first)
 
     def over_neighbours(of_one_ray):
         return pooled(job.kernel.workers, grid, job.receivers, of_one_ray)

@@ -62,9 +62,9 @@ class GatherJob:
         radiosity = (grid.reflectance * (direct + gathered)).astype(np.float32)
         return replace(self, texel_light=self.texel_light.showing(radiosity))
 
-    def direct(self, samples, seed, on_step=None):
+    def direct(self, samples, seed, on_step=None, is_first=True):
         """Direct light of ``samples`` shadow rays each, as KernelScene.direct gives it."""
-        return self.kernel.direct(self.solved.sources, self.receivers, samples, seed, on_step)
+        return self.kernel.direct(self.solved.sources, self.receivers, samples, seed, on_step, is_first)
 
     def gather(self, selected, first, take, seed, sums, on_step=None) -> int:
         """Add each of R replicates' rays ``first`` to ``first + take`` to selected receivers' ``sums`` (N, R, 3)."""

@@ -8,29 +8,54 @@ from dataclasses import replace
 import numpy as np
 
 from .kernel import KernelScene
-from .parted import is_parted
 from .patches import Grid, Patches, patch_middles
 from .scene import Scene
 
 SMALL = 0.25  # of a full-size patch's area: larger pieces stay as they are
 TURN = 0.5  # by which components of the normals are told apart
 MOST_KEYS = 1 << 62
-FLAT = 0.999  # cosine of the angle to the first piece's normal
+MOST_ROOMS = 4  # that walls part a group into
+LIFT, LOW = (
+    0.15,
+    0.02,
+)  # of a full-size patch's size over a piece it is to see the first of its group, as they may bend;
+# where there is so much room
 
 
-def joined(scene: Scene, kernel: KernelScene, grid: Grid, patches: Patches, seed: int) -> Patches:
-    """Patches of a grid, those of each object's small pieces joined that share a cube of their size and a material.
-
-    The kernel is told of them.
+def joined(scene: Scene, kernel: KernelScene, grid: Grid, patches: Patches) -> Patches:
+    """Patches of a grid, those of each object's small pieces joined that share a cube of their size, a turn and a
+    material, and see each other. The kernel is told of them.
     """
     first = _first_of_group(scene, patches, np.bincount(patches.cells))
-    found = _joined_by(kernel, grid, patches, first)
-    # a flat one that something parts has two lights; of one that bends that may be said because it bends
-    parted = is_parted(scene, kernel, found, seed).reshape(-1, 2).any(axis=1) & _are_flat(scene, patches, found)
-    apart = parted[found.owners]
-    if not (apart & (first != np.arange(len(first)))).any():
-        return found
-    return _joined_by(kernel, grid, patches, np.where(apart, np.arange(len(first)), first))
+    places = _places(scene, kernel, patches, np.flatnonzero(np.bincount(first, minlength=len(first))[first] > 1))
+    # what stands behind a wall has another light: it is joined with what stands there, too, or else left alone
+    hidden = _hidden(kernel, places, first, np.arange(len(first)))
+    for _ in range(MOST_ROOMS):
+        _, leading, which = np.unique(first[hidden], return_index=True, return_inverse=True)
+        first[hidden] = hidden[leading][which]
+        hidden = _hidden(kernel, places, first, hidden)
+    first[hidden] = hidden
+    return _joined_by(kernel, grid, patches, first)
+
+
+def _places(scene: Scene, kernel: KernelScene, patches: Patches, chosen):
+    """Points over the chosen pieces' fronts and backs, float64 (2, Q, 3) [m], from which they look for their group."""
+    middles = patch_middles(scene, patches, chosen)
+    normals = patches.size * _normals(scene)[patches.triangles[chosen]]
+    places = np.zeros((2, len(patches), 3))
+    for side, sign in enumerate((1, -1)):
+        high, low = (middles + sign * lift * normals for lift in (LIFT, LOW))
+        # inside of what is thin, and where what is rough looks across a wall
+        places[side, chosen] = np.where(kernel.occluded(low, high)[:, None], low, high)
+    return places
+
+
+def _hidden(kernel: KernelScene, places, first, chosen):
+    """Those of the chosen pieces (K,) that do not see the first of their group, on one side or the other: int64."""
+    asking = chosen[first[chosen] != chosen]
+    blocked = kernel.occluded(places[0, asking], places[0, first[asking]])
+    blocked |= kernel.occluded(places[1, asking], places[1, first[asking]])
+    return asking[blocked]
 
 
 def _first_of_group(scene: Scene, patches: Patches, pieces_of_cell):
@@ -57,10 +82,17 @@ def _key(*columns):
         column = column.astype(np.int64)
         steps = int(column.max(initial=0)) + 1
         if count * steps > MOST_KEYS:
-            ranks, key = np.unique(key, return_inverse=True)
-            count = len(ranks)
+            key, count = _ranks(key)
+        if count * steps > MOST_KEYS:
+            column, steps = _ranks(column)
         key, count = key * steps + column, count * steps
     return key
+
+
+def _ranks(numbers):
+    """The place of each number among those that there are, int64 (N,), and how many these are."""
+    present, ranks = np.unique(numbers, return_inverse=True)
+    return ranks, len(present)
 
 
 def _joined_by(kernel: KernelScene, grid: Grid, pieces: Patches, first) -> Patches:
@@ -82,13 +114,6 @@ def _joined_by(kernel: KernelScene, grid: Grid, pieces: Patches, first) -> Patch
         owners=owners,
         pieces=pieces,
     )
-
-
-def _are_flat(scene: Scene, pieces: Patches, found: Patches):
-    """Patches whose pieces all look where the first of them does, bool (P,)."""
-    normals = _normals(scene)
-    cosines = (normals[pieces.triangles] * normals[found.triangles[found.owners]]).sum(axis=1)
-    return np.bincount(found.owners, cosines < FLAT) == 0
 
 
 def _normals(scene: Scene):

@@ -184,14 +184,17 @@ class KernelScene:
         size = max(64, min(4096, (1 << 17) // (replicates * count)))
         return sum(self.workers.each_range(len(selected), size, call, on_step))
 
-    def direct(self, emitters, receivers, samples, seed, on_step=None):
-        """Direct irradiance float32 (N, 3) [W/m^2], variance of its luminance float32 (N,), shadow rays traced."""
+    def direct(self, emitters, receivers, samples, seed, on_step=None, is_first=True):
+        """Direct irradiance float32 (N, 3) [W/m^2], variance of its luminance float32 (N,), shadow rays traced.
+
+        ``is_first``: those that seem to see all or nothing of a light stop early.
+        """
         irradiance, variance = np.zeros((len(receivers), 3), np.float32), np.zeros(len(receivers), np.float32)
         lights, where = emitters.arrays(), receivers.arrays()
 
         def call(start, stop):
             return _kernel.direct(
-                self._scene, lights, where, start, stop - start, samples, seed, irradiance, variance
+                self._scene, lights, where, start, stop - start, samples, is_first, seed, irradiance, variance
             )  # fmt: skip
 
         if not len(emitters):

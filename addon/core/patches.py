@@ -29,12 +29,12 @@ class Patches:
     ----------
     size : longest edge of a patch, about [m]
     areas : float64 (P,) [m^2]
-    triangles : int32 (P,) which triangle each is part of, or has the most of
+    triangles : int32 (P,) which triangle each is part of, or the first of its pieces
     reflectance : float32 (P, 3) rho, the mean over the patch; 0 where the material transmits
     bounds : float32 (P, 4) where each lies on its triangle: distance from the apex at its wide and its narrow end, and
         from the next corner to the one after at its first and its second side, all as shares
     apexes : uint8 (T,)
-    cells : int32 (P,) which cell of its triangle's grid each is, or is part of, or has the most of
+    cells : int32 (P,) which cell of its triangle's grid each is, or is part of, or the first of its pieces
     owners, pieces : int32 (Q,) which patch each of ``pieces`` (Q) is part of, where some were joined; these have the
         bounds then
     """
@@ -141,7 +141,7 @@ def cut(scene: Scene, kernel: KernelScene, grid: Grid, along, seed: int) -> Patc
         size=grid.size,
         areas=grid.areas[triangles] * shares,
         triangles=triangles.astype(np.int32),
-        reflectance=mean_reflectance(scene, kernel, triangles.astype(np.int32), seed),
+        reflectance=_mean_reflectance(scene, kernel, triangles.astype(np.int32), seed),
         bounds=bounds.astype(np.float32),
         apexes=grid.apexes,
         cells=cells.astype(np.int32),
@@ -203,7 +203,7 @@ def _offsets(counts):
     return np.concatenate([[0], np.cumsum(counts)])
 
 
-def mean_reflectance(scene: Scene, kernel: KernelScene, triangles, seed: int):
+def _mean_reflectance(scene: Scene, kernel: KernelScene, triangles, seed: int):
     """Reflectance float32 (P, 3) of the kernel's patches, each of the material of one of its triangles (P,)."""
     factors = np.array([m.reflectance for m in scene.materials], np.float32).reshape(-1, 3)
     materials = scene.triangle_materials[triangles]

@@ -107,7 +107,7 @@ def _solved(
             grid = grid_of(scene, patch_size_for(scene, budget), budget)
             patches = finer_where_parted(scene, kernel, grid, budget, settings.seed)
             if is_rough:
-                patches = joined(scene, kernel, grid, patches, settings.seed)
+                patches = joined(scene, kernel, grid, patches)
         lit = measure(patches, within(on_step, 0.0, 0.4))
     else:
         lit = _decompose(scene, kernel, budget, error, settings.seed, measure, solve, within(on_step, 0.0, 0.4))

@@ -332,15 +332,16 @@ pl_status pl_gather(const pl_gather_scene *in, const pl_receivers *receivers, co
  * Direct irradiance from the lights: shadow rays, emitters chosen by what they would give unoccluded.
  *
  *   first, count   the range of receivers
- *   samples        shadow rays for a receiver on which all light is partly hidden; a receiver that sees
- *                  all or nothing of a light takes three eighths
+ *   samples        shadow rays for a receiver on which all light is partly hidden
+ *   is_first       whether one that seems to see all or nothing of a light stops at three eighths of these: not where
+ *                  receivers are known to be noisy, as what a small part of the rays would have found is then lost
  *   out_irradiance 3 per receiver, at the receiver's index
  *   out_variance   1 per receiver: variance of the irradiance's luminance, estimated
  *   out_rays       shadow rays traced
  */
 pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers, size_t first,
-                    size_t count, uint32_t samples, uint32_t seed, float *out_irradiance, float *out_variance,
-                    uint64_t *out_rays);
+                    size_t count, uint32_t samples, int32_t is_first, uint32_t seed, float *out_irradiance,
+                    float *out_variance, uint64_t *out_rays);
 
 /*
  * Which texels of a lightmap are receivers, and of which point: each texel whose square of bilinear influence

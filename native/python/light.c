@@ -186,11 +186,12 @@ PyObject *door_direct(PyObject *self, PyObject *args) {
     PyObject *capsule, *light_arrays, *receiver_arrays, *objects[ARRAYS];
     Py_ssize_t first, count;
     unsigned samples, seed;
+    int is_first;
     uint64_t rays = 0;
     pl_status status;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOnnIIOO", &capsule, &light_arrays, &receiver_arrays, &first, &count, &samples, &seed,
-                          &objects[IRRADIANCE], &objects[VARIANCE]))
+    if (!PyArg_ParseTuple(args, "OOOnnIpIOO", &capsule, &light_arrays, &receiver_arrays, &first, &count, &samples,
+                          &is_first, &seed, &objects[IRRADIANCE], &objects[VARIANCE]))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsule, SCENE);
     door_array arrays[] = {LIGHT_ARRAYS(0),
@@ -204,7 +205,7 @@ PyObject *door_direct(PyObject *self, PyObject *args) {
     const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
 
     Py_BEGIN_ALLOW_THREADS
-    status = pl_direct(scene, &lights, &receivers, (size_t)first, (size_t)count, samples, seed,
+    status = pl_direct(scene, &lights, &receivers, (size_t)first, (size_t)count, samples, is_first, seed,
                        arrays[IRRADIANCE].view.buf, arrays[VARIANCE].view.buf, &rays);
     Py_END_ALLOW_THREADS
 

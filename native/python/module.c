@@ -182,7 +182,7 @@ static PyMethodDef methods[] = {
      "learn_guides(scene, patches, solution, lights, receivers, members, first_members, first, count, rays, seed, "
      "out_moments) -> rays"},
     {"direct", door_direct, METH_VARARGS,
-     "direct(scene, lights, receivers, first, count, samples, seed, out_irradiance, out_variance) -> rays"},
+     "direct(scene, lights, receivers, first, count, samples, is_first, seed, out_irradiance, out_variance) -> rays"},
     {"smooth", door_smooth, METH_VARARGS,
      "smooth(grid, width, height, spacing, receivers, values, variances, step, stops_on_value, first_row, "
      "row_count, out_values, out_variances)"},

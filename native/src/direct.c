@@ -20,6 +20,7 @@ typedef struct direct_job {
     const pl_scene *scene;
     const pl_lights *lights;
     uint32_t samples, seed;
+    bool is_first;
     pl_light_balls balls;
     float *importances; /* one per light, of the receiver at hand */
     uint64_t rays;
@@ -130,7 +131,7 @@ static void estimate_from_few(const light_sums *sums, const light_sums *other, c
     }
 }
 
-/* A light of its own rays: few where it is all seen or all hidden, the full number in its penumbra. */
+/* A light of its own rays: at first few where it is all seen or all hidden, the full number in its penumbra. */
 static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, size_t light, uint32_t samples,
                              uint32_t seed, float io_totals[REPLICATES][3]) {
     if (light_is_sharp(job->lights, light)) {
@@ -148,7 +149,7 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
         return;
     float exact[3];
     aimed_exact(&aimed, exact);
-    const uint32_t few = most < FEW ? most : most * 3 / 8 < FEW ? FEW : most * 3 / 8;
+    const uint32_t few = most < FEW || !job->is_first ? most : most * 3 / 8 < FEW ? FEW : most * 3 / 8;
     light_sums sums[REPLICATES] = {{{0}, {0}, 0, 0}};
     uint32_t visible = 0;
     for (uint32_t r = 0; r < REPLICATES; ++r) {
@@ -225,14 +226,15 @@ static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint
 }
 
 pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers, size_t first,
-                    size_t count, uint32_t samples, uint32_t seed, float *out_irradiance, float *out_variance,
-                    uint64_t *out_rays) {
+                    size_t count, uint32_t samples, int32_t is_first, uint32_t seed, float *out_irradiance,
+                    float *out_variance, uint64_t *out_rays) {
     for (size_t i = first; i < first + count; ++i)
         if (!receiver_is_valid(scene, receivers, i))
             return PL_ERR_ARGUMENT;
     if (!lights_are_valid(lights))
         return PL_ERR_ARGUMENT;
-    direct_job job = {.scene = scene, .lights = lights, .samples = samples ? samples : 1, .seed = seed};
+    direct_job job = {
+        .scene = scene, .lights = lights, .samples = samples ? samples : 1, .is_first = is_first != 0, .seed = seed};
     job.importances = malloc(sizeof(float) * (lights->count + 1));
     if (!job.importances || !light_balls_create(lights, &job.balls)) {
         free(job.importances);

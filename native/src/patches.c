@@ -86,13 +86,14 @@ static pl_status join(pl_patches *patches, const pl_patch_layout *layout) {
     if (layout->patch_count > patches->piece_count)
         return PL_ERR_ARGUMENT;
     patches->patch_count = layout->patch_count;
-    patches->owners = copy_of(layout->owners, patches->piece_count);
+    patches->owners = malloc(sizeof *patches->owners * (patches->piece_count + 1));
     patches->first_members = calloc(patches->patch_count + 1, sizeof *patches->first_members);
     patches->members = malloc(sizeof *patches->members * (patches->piece_count + 1));
     patches->before = malloc(sizeof *patches->before * (patches->piece_count + 1));
     int32_t *next = malloc(sizeof *next * (patches->patch_count + 1));
     pl_status status = PL_ERR_MEMORY;
     if (patches->owners && patches->first_members && patches->members && patches->before && next) {
+        memcpy(patches->owners, layout->owners, sizeof *patches->owners * patches->piece_count);
         count_members(patches->owners, patches->piece_count, patches->first_members, patches->patch_count);
         status = PL_ERR_ARGUMENT;
         if (owners_are_valid(patches->owners, patches->piece_count, patches->first_members, patches->patch_count)) {

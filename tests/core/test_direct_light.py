@@ -15,7 +15,7 @@ class Lamp:
     def __init__(self, deviation):
         self.deviation, self.rays, self.rng = deviation, 0, np.random.default_rng(5)
 
-    def __call__(self, chosen, samples, seed, on_step):
+    def __call__(self, chosen, samples, seed, on_step, is_first):
         spread = self.deviation[chosen, None] / np.sqrt(samples / 2)
         self.rays += len(spread) * samples
         replicates = LIGHT + spread * self.rng.standard_normal((len(spread), 2))

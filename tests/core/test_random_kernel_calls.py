@@ -178,8 +178,9 @@ def test_direct_light_of_any_lights(data):
     count = data.draw(counts)
     where = receivers(data.draw, 2 * kernel[2], count)
     out, variance = np.full((count, 3), np.nan, np.float32), np.full(count, np.nan, np.float32)
+    first = data.draw(st.booleans())
     try:
-        _kernel.direct(kernel[0], light_table(data.draw), where, 0, count, 8, data.draw(seeds), out, variance)
+        _kernel.direct(kernel[0], light_table(data.draw), where, 0, count, 64, first, data.draw(seeds), out, variance)
     except REFUSALS:
         return
     assert np.isfinite(out).all()
