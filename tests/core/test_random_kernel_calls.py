@@ -89,7 +89,7 @@ def test_rays_from_anywhere_to_anywhere(data):
     triangles, hits, hidden = np.empty(count, np.int32), np.empty((count, 3), np.float32), np.empty(count, np.uint8)
     _kernel.closest_hits(kernel[0], origins, directions, triangles, hits)
     _kernel.occluded(kernel[0], origins, directions.astype(np.float64), hidden)
-    assert ((triangles >= -1) & (triangles <= kernel[2])).all()
+    assert ((triangles >= -1) & (triangles < kernel[3])).all()
     assert (hits[triangles >= 0, 2] >= 0).all()
     assert (hidden <= 1).all()
 
