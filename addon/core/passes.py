@@ -31,6 +31,8 @@ AIM, DENOISED_AIM = 0.95, 1.03  # of the target: what receivers are due is an es
 STEP = 0.85  # of gathered light's error, at the most, is aimed at: who is due hardly more than it has gets nothing
 LEAST_PART = 0.5  # of the error aimed at is left to gathered light, however noisy the direct light is
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
+SPECKLE = 2.0  # times the target: receivers that noisy are seen when the first pass meets it; then they get GROWTH
+SPECKLE_SHARE = 1 / 8  # times more, and of all no more than so many of those traced. Other passes are for these, too
 ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
 
 
@@ -123,7 +125,7 @@ def gather_until(
     first = first_rays(fewest, error, pace * seconds_left() / (REPLICATES * count))
     active, further = np.arange(count), np.full(count, first)
     aim = AIM if denoise is None or grid is None else DENOISED_AIM
-    budget, idle, begin, rms = 0, 0, 0.0, np.inf
+    budget, idle, begin, rms, is_first = 0, 0, 0.0, np.inf, True
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
@@ -145,16 +147,15 @@ def gather_until(
             found, aim = _denoised(denoise, grid, found, gathered, direct, probes), AIM
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
-        if rms <= error:
+        if rms <= error and not is_first:
             stopped = ""
         elif idle == MOST_IDLE:
             stopped = "as further rays no longer help"
         else:
-            errors = measured_errors(found.noise, probes.receivers, found.squares)
-            errors, aimed_at = _gathered_part(errors, rms, aim * error, direct_rms)
-            due = rays_due(errors, samples.taken, aimed_at)
+            due = _due(found, samples, probes, error, aim, direct_rms)
             in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
-            active, further, stopped = _next(due, samples, budget - samples.rays, in_time)
+            active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
+        is_first = False
         if stopped is not None:
             found = found if is_asked else _denoised(denoise, grid, found, gathered, direct, probes)
             traced = samples.rays, probes.measured.rays
@@ -200,18 +201,34 @@ def _denoised(denoise, grid, found: _Found, gathered, direct, probes: Probes) ->
     return min(found, other, key=lambda estimate: estimate.rms)
 
 
+def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, direct_rms):
+    """Rays of a replicate that each receiver is due (N,): when the target is met, only speckles.
+
+    A speckle is a receiver whose noise is seen then, as a soft dot that smoothing has made of it.
+    """
+    if found.rms <= error:
+        return np.where(found.noise > SPECKLE * error, np.inf, 0.0)
+    errors = measured_errors(found.noise, probes.receivers, found.squares)
+    errors, aimed_at = _gathered_part(errors, found.rms, aim * error, direct_rms)
+    return rays_due(errors, samples.taken, aimed_at)
+
+
 def _gathered_part(errors, rms, target, direct_rms):
     """Of errors (N,) and of the target for their ``rms`` what is gathered light's: no ray takes direct light's off."""
     left, wanted = (np.sqrt(max(both**2 - direct_rms**2, (LEAST_PART * both) ** 2)) for both in (rms, target))
     return errors * (left / rms), min(wanted, STEP * left)
 
 
-def _next(due, samples: _Samples, rays_left, rays_in_time):
+def _next(due, samples: _Samples, is_met, rays_left, rays_in_time):
     """The receivers of the next pass (K,), further rays of each (N,), and what stops it, None where nothing does."""
+    if is_met:
+        rays_left = min(rays_left, SPECKLE_SHARE * samples.rays)
     wanting, _ = next_pass(due, samples.taken, MOST_RAYS, samples.cost, np.inf)
     active, further = next_pass(due, samples.taken, MOST_RAYS, samples.cost, min(rays_left, rays_in_time))
     if len(wanting) and len(active) >= ENOUGH * len(wanting):
         return active, further, None
+    if is_met:
+        return active, further, ""
     if not len(wanting):
         return active, further, "as receivers have the most rays that they may"
     return active, further, "by the time limit" if rays_in_time < rays_left else "by the budget of rays"

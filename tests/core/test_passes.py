@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from addon.core.allocation import rays_due
 from addon.core.gather_job import REPLICATES
 from addon.core.passes import (
     AIM,
@@ -14,13 +13,17 @@ from addon.core.passes import (
     LEAST_FIRST,
     MOST_FIRST,
     MOST_RAYS,
+    SPECKLE_SHARE,
     STEP,
+    _due,
+    _Found,
     _gathered_part,
     _next,
     _Samples,
     first_rays,
     ray_budget,
 )
+from addon.core.probes import Measured, Probes
 
 COUNT = 4096
 
@@ -50,11 +53,30 @@ def samples_of(taken):
     return samples
 
 
-def next_of(errors, rays_left=1e12, rays_in_time=np.inf, aim=AIM, taken=8):
+def next_of(errors, rays_left=1e12, rays_in_time=np.inf, aim=AIM, taken=8, error_found=None):
     """What comes after errors (N,) for a target of 0.02: samples so far, receivers, further rays, what stops it."""
-    samples, rms = samples_of(taken), float(np.sqrt(np.mean(errors**2)))
-    errors, target = _gathered_part(errors, rms, aim * 0.02, 0.0)
-    return samples, *_next(rays_due(errors, samples.taken, target), samples, rays_left, rays_in_time)
+    samples, chosen = samples_of(taken), np.arange(0, COUNT, 8)
+    # those that are measured have one error, so that it is known
+    rms = float(np.sqrt(np.mean(errors**2))) if error_found is None else error_found
+    found = _Found(np.zeros((COUNT, 3)), errors, np.full(len(chosen), rms**2))
+    probes = Probes(chosen, np.ones(len(chosen)), Measured(np.zeros(len(chosen)), np.zeros(len(chosen)), 0))
+    due = _due(found, samples, probes, 0.02, aim, 0.0)
+    return samples, *_next(due, samples, rms <= 0.02, rays_left, rays_in_time)
+
+
+SPECKLED = np.where(np.arange(COUNT) % 32 == 0, 0.5, 0.001)
+
+
+def test_a_target_that_is_met_leaves_speckles_an_eighth_of_the_rays_at_the_most():
+    samples, active, further, stopped = next_of(SPECKLED, error_found=0.01)
+    assert stopped is None
+    assert set(active) <= set(np.flatnonzero(SPECKLED > 0.1))
+    assert 0 < samples.cost * further[active].sum() <= SPECKLE_SHARE * samples.rays
+
+
+def test_a_target_that_is_met_is_stopped_by_nothing():
+    for noise, rays_left in ((np.full(COUNT, 0.001), 1e12), (np.full(COUNT, 0.5), 0)):
+        assert next_of(noise, rays_left, error_found=0.01)[3] == ""
 
 
 def test_a_target_missed_by_a_hair_is_gone_on_for():
@@ -99,7 +121,7 @@ def test_a_pass_that_few_of_those_that_want_it_can_be_given_is_not_worth_it():
     for share, expected in ((ENOUGH / 2, "by the budget of rays"), (2 * ENOUGH, None)):
         loud = np.arange(COUNT) < share * COUNT
         rays_left = REPLICATES * 16 * loud.sum()
-        active, further, stopped = _next(np.where(loud, 40.0, 12.0), samples, rays_left, np.inf)
+        active, further, stopped = _next(np.where(loud, 40.0, 12.0), samples, False, rays_left, np.inf)
         assert set(active) == set(np.flatnonzero(loud))
         assert samples.cost * further[active].sum() <= rays_left
         assert stopped == expected
