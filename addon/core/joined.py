@@ -15,11 +15,8 @@ SMALL = 0.25  # of a full-size patch's area: larger pieces stay as they are
 TURN = 0.5  # by which components of the normals are told apart
 MOST_KEYS = 1 << 62
 MOST_ROOMS = 4  # that walls part a group into
-LIFT, LOW = (
-    0.15,
-    0.02,
-)  # of a full-size patch's size over a piece it is to see the first of its group, as they may bend;
-# where there is so much room
+LIFT = 0.15  # of a full-size patch over and under itself, a piece is to see the first of its group, as both may bend,
+LOW = 0.02  # or no further, where there is not so much room
 
 
 def joined(scene: Scene, kernel: KernelScene, grid: Grid, patches: Patches) -> Patches:
