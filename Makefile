@@ -1,6 +1,6 @@
 # make bake   set everything up, bake the demo, say where the pictures are
 # make test   set everything up, run the tests
-# make fuzz   ten thousand random scenes baked whole (half an hour), and random calls of the kernel
+# make fuzz   ten thousand random scenes baked whole (a quarter of an hour), and random calls of the kernel
 # make sanitize  the core's and the physics' tests over a kernel with address and undefined-behaviour checks
 # make bench  speed against error on exact scenes, quick settings: a table, and JSON and plots in out/bench
 # make bench-cycles SCENE=S.blend REFERENCE=S.npz  seconds and error beside Cycles' own bake of the same texels

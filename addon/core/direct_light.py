@@ -68,12 +68,14 @@ def refined_direct(
         of_one_ray = np.minimum(variance / scale**2, 1.0) * samples
         noise = np.sqrt(weights * np.minimum(pooled(of_one_ray) / samples, 1.0))
         rms = float(np.sqrt(np.mean(noise**2)))
+        if rms <= SHARE * error or attempt > PASSES:
+            break
         due = np.minimum(rays_due(noise, samples, SHARE * error, EVENNESS), MOST_SAMPLES)
         further = np.maximum(due**EVENNESS - samples**EVENNESS, 1) ** (1 / EVENNESS)
         wanted = 2 ** np.round(np.log2(further)).astype(np.int64)
         wanted[wanted < WORTH * samples] = 0
-        if rms <= SHARE * error or attempt > PASSES or not wanted.any():
-            return DirectLight(values, variance, samples, rays, rms)
+        if not wanted.any():
+            break
         # half of what is left of the bar for each pass
         begin, width = 1 - 0.5 ** (attempt - 1), 0.5**attempt / max(wanted.sum(), 1)
         for count in np.unique(wanted[wanted > 0]):
@@ -89,3 +91,4 @@ def refined_direct(
             variance[chosen] = new * its_variance
             samples[chosen] = (worth + before) ** (1 / EVENNESS)
             rays, begin = rays + traced, begin + share
+    return DirectLight(values, variance, samples, rays, rms)

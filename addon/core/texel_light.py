@@ -12,7 +12,7 @@ from .receivers import Receivers
 LIFT = 0.1  # texels above the surface, where it is looked for what stands on it
 SPREAD = 2  # texels that light is blurred over before rays see it
 BAND = 256  # rows of the grid at once
-MOST_BITS = (1 << 31) - 1
+BUT_SIGN = np.uint32((1 << 31) - 1)
 NO_LIGHT = np.uint64((1 << 64) - 1)
 TOUCHING = 2.0  # texels: receivers that are further apart are not neighbours, though their texels are
 
@@ -65,10 +65,8 @@ def packed(light):
 
     Rounded to 6e-5 of it, half to either side.
     """
-    # a zero below 0 must not mark the texel, nor one channel reach into the next
-    bits = np.ascontiguousarray(np.maximum(light, 0), np.float32).view(np.uint32).astype(np.uint64) & np.uint64(
-        MOST_BITS
-    )
+    # the sign of -0.0 must not mark the texel, nor reach into the next channel
+    bits = (np.ascontiguousarray(light, np.float32).view(np.uint32) & BUT_SIGN).astype(np.uint64)
     red, green, blue = ((bits + np.uint64(1 << 9)) >> np.uint64(10)).T
     return red | green << np.uint64(21) | blue << np.uint64(42)
 

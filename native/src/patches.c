@@ -48,7 +48,7 @@ static int32_t *copy_of(const int32_t *numbers, size_t count) {
 }
 
 /* Which run each number belongs to: the inverse of offsets. */
-static int32_t *owners(const int32_t *offsets, size_t count) {
+static int32_t *run_of_each(const int32_t *offsets, size_t count) {
     int32_t *owner = malloc(sizeof *owner * ((size_t)offsets[count] + 1));
     for (size_t i = 0; owner && i < count; ++i)
         for (int32_t k = offsets[i]; k < offsets[i + 1]; ++k)
@@ -119,9 +119,9 @@ pl_status pl_patches_create(const pl_patch_layout *layout, pl_patches **out_patc
     patches->first_rows = copy_of(layout->first_rows, layout->triangle_count + 1);
     patches->first_cells = copy_of(layout->first_cells, layout->row_count + 1);
     patches->first_pieces = copy_of(layout->first_pieces, layout->cell_count + 1);
-    patches->piece_cells = owners(layout->first_pieces, layout->cell_count);
-    patches->cell_rows = owners(layout->first_cells, layout->row_count);
-    patches->row_triangles = owners(layout->first_rows, layout->triangle_count);
+    patches->piece_cells = run_of_each(layout->first_pieces, layout->cell_count);
+    patches->cell_rows = run_of_each(layout->first_cells, layout->row_count);
+    patches->row_triangles = run_of_each(layout->first_rows, layout->triangle_count);
     if (!patches->apexes || !patches->first_rows || !patches->first_cells || !patches->first_pieces ||
         !patches->piece_cells || !patches->cell_rows || !patches->row_triangles) {
         pl_patches_destroy(patches);

@@ -32,9 +32,11 @@ def test_light_is_rounded_to_six_in_a_hundred_thousand_and_not_to_one_side():
     assert abs(relative.mean()) < 4 * 3e-5 / 30000**0.5
 
 
-@pytest.mark.parametrize("value", [0.0, 1.0, 1.5, 2.0**-149, 2.0**-126, 1e38])
+@pytest.mark.parametrize("value", [0.0, -0.0, 1.0, 1.5, 2.0**-149, 2.0**-126, 1e38])
 def test_dark_stays_dark_and_extremes_are_numbers(value):
-    found = unpacked(packed(np.full((1, 3), value, np.float32)))
+    light = packed(np.full((1, 3), value, np.float32))
+    assert light[0] >> np.uint64(63) == 0
+    found = unpacked(light)
     assert np.isfinite(found).all()
     # denormals have fewer bits: of what is smaller than 1e-38 some is lost
     assert found == pytest.approx(value, rel=2.0**-14, abs=2.0**-126)
