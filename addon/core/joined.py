@@ -38,7 +38,7 @@ def joined(scene: Scene, kernel: KernelScene, grid: Grid, patches: Patches) -> P
 def _places(scene: Scene, kernel: KernelScene, patches: Patches, chosen):
     """Points over the chosen pieces' fronts and backs, float64 (2, Q, 3) [m], from which they look for their group."""
     middles = patch_middles(scene, patches, chosen)
-    normals = patches.size * _normals(scene)[patches.triangles[chosen]]
+    normals = patches.size * _normals(scene, patches.triangles[chosen])
     places = np.zeros((2, len(patches), 3))
     for side, sign in enumerate((1, -1)):
         high, low = (middles + sign * lift * normals for lift in (LIFT, LOW))
@@ -63,7 +63,7 @@ def _first_of_group(scene: Scene, patches: Patches, pieces_of_cell):
     objects = np.repeat(np.arange(len(scene.objects)), [obj.count for obj in scene.objects])[triangles]
     middles = patch_middles(scene, patches, small)
     cubes = np.floor((middles - middles.min(axis=0, initial=np.inf)) / patches.size)
-    turns = np.round(_normals(scene)[triangles] / TURN) + 1 / TURN
+    turns = np.round(_normals(scene, triangles) / TURN) + 1 / TURN
     _, first, which = np.unique(
         _key(objects, scene.triangle_materials[triangles], *cubes.T, *turns.T), return_index=True, return_inverse=True
     )
@@ -113,8 +113,8 @@ def _joined_by(kernel: KernelScene, grid: Grid, pieces: Patches, first) -> Patch
     )
 
 
-def _normals(scene: Scene):
-    """Unit normals of the triangles, float64 (T, 3)."""
-    a, b, c = np.moveaxis(scene.corners, 1, 0)
+def _normals(scene: Scene, triangles):
+    """Unit normals of triangles (K,), float64 (K, 3)."""
+    a, b, c = np.moveaxis(scene.vertices[scene.triangles[triangles]], 1, 0)
     normals = np.cross(b - a, c - a)
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
