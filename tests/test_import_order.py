@@ -19,7 +19,7 @@ CORE_ORDER = (
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
     *("transport", "aimed", "hemicube", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
-    *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides"),
+    *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides", "gather_sums"),
     *("patch_solution", "patch_light", "decomposition", "choose", "laws", "radiosity"),
     *("charts", "cut", "flatten", "packing", "unwrap", "texels", "gaps", "smoothing", "probes"),
     *(

@@ -22,14 +22,14 @@ def measured_errors(relative, chosen, squares):
     relative : (N,) stated noise of each
     chosen, squares : (M,) some of them, and their squared relative errors as measured: negative ones are noise of that
     """
-    relative = np.maximum(relative, LEAST_NOISE)
+    relative = np.maximum(relative, np.float32(LEAST_NOISE))
     order = np.argsort(relative[chosen], kind="stable")
     bins = [part for part in np.array_split(order, BINS) if len(part)]
     stated = np.array([np.sqrt(np.mean(relative[chosen[part]] ** 2)) for part in bins])
     # what is noisier is not less wrong: where it seems so, that is chance
     found = np.sqrt(np.maximum.accumulate([max(squares[part].mean(), 0.0) for part in bins]))
-    ratio = found / stated
-    return relative * np.interp(relative, stated, ratio)
+    relative *= np.interp(relative, stated, found / stated)
+    return relative
 
 
 def rays_due(errors, taken, target, power=1.0):
@@ -39,12 +39,13 @@ def rays_due(errors, taken, target, power=1.0):
     s_i = errors^2 * taken^power, which is least for its rays where n_i is in proportion to s_i^(1 / (1 + power)): for a
     power of 1 to the noise of one ray (Neyman 1934, "optimum allocation").
     """
+    errors = np.asarray(errors, np.float64)  # their squares may leave float32
     share = (errors**2 * taken**power) ** (1 / (1 + power))
     return share * (share.sum() / (len(share) * target**2)) ** (1 / power)
 
 
 def next_pass(due, taken, most, cost, rays_left):
-    """Receivers that the next pass is for, in order, int64 (K,), and rays of a replicate for each of all, int64 (N,).
+    """Receivers that the next pass is for, in order, int64 (K,), and rays of a replicate for each of all, int32 (N,).
 
     The power of two next to what they are due, so that neighbours share its even spread, and none above what they may
     have; fewer for all where the pass could not be afforded.
@@ -56,12 +57,14 @@ def next_pass(due, taken, most, cost, rays_left):
     most : that one may have
     cost : rays traced for one of all replicates
     """
+    taken = taken.astype(due.dtype)
     allowed = np.maximum(np.minimum(most - taken, GROWTH * taken), 0)
     highest = np.floor(np.log2(np.maximum(allowed, 1)))
     due = np.minimum(due, taken + allowed)
     while True:
         wanted = np.maximum(due - taken, 0)
-        further = 2 ** np.minimum(np.round(np.log2(np.maximum(wanted, 1))), highest).astype(np.int64)
+        powers = np.round(np.log2(np.maximum(wanted, 1)))
+        further = 2 ** np.minimum(powers, highest).astype(np.int32)
         active = np.flatnonzero(wanted >= np.maximum((WORTH - 1) * taken, 1))
         if cost * further[active].sum() <= rays_left or not len(active):
             return active, further

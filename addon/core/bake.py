@@ -64,13 +64,7 @@ def bake(
         open_denoiser(denoiser_library, settings, progress.poll) as (denoise, no_denoiser),
     ):
         if settings.target == "lightmap":
-            progress.begin("unwrap")
-            charts = unwrap(scene, settings, progress.step)
-            progress.begin("texels")
-            texel_map = texels(charts)
-            receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
-            grid = texel_grid(scene, charts, texel_map, receivers)
-            seen = seen_through_lightmap(scene, charts, texel_map, settings.seed)
+            receivers, grid, seen = _on_texels(scene, settings, progress)
         else:
             progress.begin("texels")
             receivers, corner_means = vertex_receivers(scene, settings.smooth_angle_deg)
@@ -91,7 +85,7 @@ def bake(
         progress.begin("texels")
         lightmap = corner_colours = None
         if settings.target == "lightmap":
-            lightmap = assemble(irradiance.values, texel_map, charts)
+            lightmap = assemble(irradiance.values, grid.receivers, grid.uvs)
             lightmap = replace(lightmap, uvs=sound.spread(lightmap.uvs))
         else:
             corner_colours = np.full((len(scene.triangles), 3, 3), np.nan, np.float32)
@@ -102,6 +96,17 @@ def bake(
         denoiser = _denoiser_used(denoise, no_denoiser, irradiance)
     report = _report(scene, settings, progress, solved, irradiance, lightmap, denoiser)
     return BakeResult(lightmap, corner_colours, report)
+
+
+def _on_texels(scene: Scene, settings: BakeSettings, progress: Progress):
+    """A lightmap's receivers, the grid of texels that they are, and points at which it is looked up."""
+    progress.begin("unwrap")
+    charts = unwrap(scene, settings, progress.step)
+    progress.begin("texels")
+    texel_map = texels(charts)
+    receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
+    grid = texel_grid(scene, charts, texel_map, receivers)
+    return receivers, grid, seen_through_lightmap(scene, grid.receivers, grid.uvs, settings.seed)
 
 
 def _require_targets(sound: SoundFaces) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .emitters import LUMINANCE
+from .emitters import luminance_of
 from .gaps import fill_gaps
 from .probes import Measured
 from .relative import scale_of
@@ -27,30 +27,31 @@ def denoised(denoise, grid: TexelGrid, values, direct, gathered, chosen, probes:
     chosen : receivers (K,) that ``probes`` measured
     """
     is_set = grid.receivers >= 0
-    order = grid.receivers[is_set]
     image = np.zeros((*is_set.shape, 3), np.float32)
-    image[is_set] = (direct + gathered)[order]
+    image[is_set] = (direct + gathered)[grid.receivers[is_set]]
     fill_gaps(image, is_set)
     result = denoise(image)
     if result is None:
         return values
-    clean = np.empty_like(gathered)
-    clean[order] = result[is_set]
+    del image
+    other = np.empty_like(gathered)
+    other[grid.receivers[is_set]] = result[is_set]
+    del result
     # where there is no gathered light, to the bit, there is none
-    usable = np.isfinite(clean) & (values != direct)
-    other = np.where(usable, np.maximum(clean, 0), values).astype(np.float32)
+    is_usable = np.isfinite(other) & (values != direct)
+    other = np.where(is_usable, np.maximum(other, 0), values)
     return mixed(values, other, chosen, probes)
 
 
 def mixed(first, second, chosen, probes: Measured):
     """Two estimates (N, 3) of irradiance, mixed so that the error is least at the probes: float32 (N, 3)."""
     scale = scale_of(first)
-    apart = (second - first) @ LUMINANCE / scale
+    apart = luminance_of(second - first) / scale
     count = max(1, min(SHARES, len(chosen) // LEAST_PROBES_OF_SHARE))
     bounds = np.quantile(np.abs(apart[chosen]), np.linspace(0, 1, count + 1)[1:-1])
-    group = np.searchsorted(bounds, np.abs(apart))
+    group = np.searchsorted(bounds, np.abs(apart)).astype(np.int8)
     # one wrong point counts as one, however wrong
-    wanted = np.clip((probes.luminance - first[chosen] @ LUMINANCE) / scale[chosen], -1, 1)
+    wanted = np.clip((probes.luminance - luminance_of(first[chosen])) / scale[chosen], -1, 1)
     along = np.bincount(group[chosen], wanted * apart[chosen], count)
     shares = np.clip(along / np.maximum(np.bincount(group[chosen], apart[chosen] ** 2, count), 1e-30), 0, 1)
-    return (first + shares[group, None] * (second - first)).astype(np.float32)
+    return first + shares.astype(np.float32)[group, None] * (second - first)

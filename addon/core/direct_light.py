@@ -27,7 +27,7 @@ class DirectLight:
     ----------
     values : float32 (N, 3) E [W/m^2]
     variance : float32 (N,) of its luminance, as two replicates state it
-    samples : float64 (N,) as many shadow rays at once would be as good as those of each
+    samples : float32 (N,) as many shadow rays at once would be as good as those of each
     rays : shadow rays traced
     rms : what its relative noise comes to, once that is known
     """
@@ -51,7 +51,7 @@ def first_direct(trace: Callable, error: float, seed: int, on_step: Callable[[fl
     """
     samples = max(int(FIRST * shadow_samples(error)), LEAST_FIRST)
     values, variance, rays = trace(slice(None), samples, seed, on_step, True)
-    return DirectLight(values, variance, np.full(len(values), float(samples)), rays)
+    return DirectLight(values, variance, np.full(len(values), samples, np.float32), rays)
 
 
 def refined_direct(
@@ -65,15 +65,12 @@ def refined_direct(
     values, variance, samples = first.values.copy(), first.variance.copy(), first.samples.copy()
     rays = first.rays
     for attempt in range(1, PASSES + 2):
-        of_one_ray = np.minimum(variance / scale**2, 1.0) * samples
-        noise = np.sqrt(weights * np.minimum(pooled(of_one_ray) / samples, 1.0))
-        rms = float(np.sqrt(np.mean(noise**2)))
+        noise = np.minimum(np.sqrt(variance) / scale, 1.0) ** 2 * samples
+        noise = np.sqrt(weights * np.minimum(pooled(noise) / samples, 1.0))
+        rms = float(np.sqrt(np.mean(noise**2, dtype=np.float64)))
         if rms <= SHARE * error or attempt > PASSES:
             break
-        due = np.minimum(rays_due(noise, samples, SHARE * error, EVENNESS), MOST_SAMPLES)
-        further = np.maximum(due**EVENNESS - samples**EVENNESS, 1) ** (1 / EVENNESS)
-        wanted = 2 ** np.round(np.log2(further)).astype(np.int64)
-        wanted[wanted < WORTH * samples] = 0
+        wanted = _further_rays(rays_due(noise, samples, SHARE * error, EVENNESS), samples)
         if not wanted.any():
             break
         # half of what is left of the bar for each pass
@@ -84,7 +81,7 @@ def refined_direct(
             again, its_variance, traced = trace(
                 chosen, int(count), seed + 1000 * attempt, within(on_step, begin, share), False
             )
-            before, worth = samples[chosen] ** EVENNESS, count**EVENNESS
+            before, worth = samples[chosen] ** EVENNESS, float(count) ** EVENNESS
             new = (worth / (worth + before)).astype(np.float32)
             values[chosen] += new[:, None] * (again - values[chosen])
             # by these alone: who goes on is who was found noisy, by chance as well
@@ -92,3 +89,12 @@ def refined_direct(
             samples[chosen] = (worth + before) ** (1 / EVENNESS)
             rays, begin = rays + traced, begin + share
     return DirectLight(values, variance, samples, rays, rms)
+
+
+def _further_rays(due, samples):
+    """Rays to trace besides ``samples`` (N,) to be as good as ``due`` (N,) would be, powers of two: int32 (N,)."""
+    due = np.minimum(due, MOST_SAMPLES)
+    further = np.maximum(due**EVENNESS - samples**EVENNESS, 1) ** (1 / EVENNESS)
+    wanted = 2 ** np.round(np.log2(further)).astype(np.int32)
+    wanted[wanted < WORTH * samples] = 0
+    return wanted

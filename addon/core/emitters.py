@@ -18,6 +18,11 @@ GROUP_TRIANGLES = 8  # a group of no more has a closed form in the kernel
 TEXTURE_CUTS = 8  # a triangle whose glow is an image is cut into so many squared
 
 
+def luminance_of(light):
+    """The luminance (...) of light (..., 3), as exact as that is: of many float32 no copies in float64 are made."""
+    return light @ LUMINANCE.astype(light.dtype)
+
+
 @dataclass(frozen=True, slots=True)
 class Emitters:
     """Rows of the kernel's light table (native/include/patchlight.h, pl_lights), relative to the scene's centre."""

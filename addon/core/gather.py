@@ -87,30 +87,32 @@ def gather_irradiance(
     started = time.perf_counter()
     weights = grid.shown if grid else np.ones(len(receivers), np.float32)
     job = GatherJob(kernel, solved, receivers, weights, no_guides(len(receivers)))
-    lit, look, looks = _first_look(job, grid, error, seed, within(on_step, 0.0, 0.35))
-    direct = lit.values
-    if grid is not None:
-        job, further = _with_texel_light(job, grid, direct, look, seed + 2, within(on_step, 0.35, 0.05))
-        looks += further
+    job, direct, direct_rms, rays = _first_looks(job, grid, error, seed, within(on_step, 0.0, 0.4))
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     job = replace(job, guides=guides)
-    pace = (lit.rays + looks + learning) / (time.perf_counter() - started)
+    pace = (rays["direct"] + rays["gather"] + learning) / (time.perf_counter() - started)
     passes = within(on_step, 0.4, 0.6)
-    gathered = gather_until(job, grid, direct, lit.rms, denoise, error, seed, pace, seconds_left, passes)
-    at_points = measure(gathered.job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
+    gathered = gather_until(job, grid, direct, direct_rms, denoise, error, seed, pace, seconds_left, passes)
+    at_points = measure(job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
     # relative to what is there, not to what is shown: light that leaks into the dark has to count as all wrong
     scale = scale_of_luminance(at_points.luminance)
     seen_error = rms_of(at_points.squares_of(seen.look_up(gathered.values), scale))
-    traced = {
-        "direct": lit.rays,
-        "gather": looks + learning + gathered.rays,
-        "probe": gathered.probe_rays + at_points.rays,
-    }
+    rays["gather"] += learning + gathered.rays
+    rays["probe"] = gathered.probe_rays + at_points.rays
     is_met = gathered.rms <= error
-    return Irradiance(gathered.values, gathered.rms, seen_error, is_met, gathered.stopped, gathered.is_denoised, traced)
+    return Irradiance(gathered.values, gathered.rms, seen_error, is_met, gathered.stopped, gathered.is_denoised, rays)
 
 
-def _first_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
+def _first_looks(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
+    """The job whose rays see about what is there, direct light (N, 3) and its relative error, and the rays of both."""
+    direct, look, rays = _direct_and_look(job, grid, error, seed, within(on_step, 0.0, 0.875))
+    if grid is not None:
+        job, further = _with_texel_light(job, grid, direct.values, look, seed + 2, within(on_step, 0.875, 0.125))
+        rays += further
+    return job, direct.values, direct.rms, {"direct": direct.rays, "gather": rays}
+
+
+def _direct_and_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
     """Direct light, what a few gather rays find (N, 3) and how many these were.
 
     Direct light comes in two parts, as how much noise it may have depends on what else there is.
@@ -137,9 +139,10 @@ def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed, on_st
     reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
     is_split = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
     job = replace(job.looking_further(FAR), texel_light=texel_light(grid.uvs, grid.receivers, is_split, reach))
-    job, rays, share = job.seeing(grid, direct, look), 0, 1 / (LOOKS - 1)
+    job.show(grid, direct, look)
+    rays, share = 0, 1 / (LOOKS - 1)
     for again in range(1, LOOKS):
         look, traced = job.glimpse(TEXEL_LOOK_RAYS, seed + 1000 * again, within(on_step, (again - 1) * share, share))
-        job = job.seeing(grid, direct, blurred(job.kernel.workers, grid, job.receivers, look))
+        job.show(grid, direct, blurred(job.kernel.workers, grid, job.receivers, look))
         rays += traced
     return job, rays

@@ -77,20 +77,23 @@ def _shares(moments):
 
 def _neighbours(receivers):
     """Receivers in an order in which neighbours are near, and where each group starts and ends in it, (G,)."""
-    low = receivers.positions.min(axis=0)
+    # axis by axis, as three at once would take more memory than the receivers do
     extent = max(float(np.ptp(receivers.positions, axis=0).max()), 1e-30)
-    cells = np.clip((receivers.positions - low) / extent * 1023, 0, 1023).astype(np.uint64)
-    facing = np.clip((receivers.normals + 1) * (0.5 * NORMAL_CELLS), 0, NORMAL_CELLS - 1).astype(np.uint64)
-    way = (facing[:, 0] * NORMAL_CELLS + facing[:, 1]) * NORMAL_CELLS + facing[:, 2]
-    order = np.argsort(way << np.uint64(30) | z_order(*cells.T), kind="stable")
+    cells = [np.clip((axis - axis.min()) / extent * 1023, 0, 1023).astype(np.uint16) for axis in receivers.positions.T]
+    way = np.zeros(len(receivers), np.uint64)
+    for axis in receivers.normals.T:
+        facing = np.clip((axis + 1) * (0.5 * NORMAL_CELLS), 0, NORMAL_CELLS - 1)
+        way = way * np.uint64(NORMAL_CELLS) + facing.astype(np.uint64)
+    order = np.argsort(way << np.uint64(30) | z_order(*cells), kind="stable")
     # a group ends where its receivers look elsewhere, or when it is full
     turns = np.flatnonzero(np.diff(way[order], prepend=way[order][:1] + np.uint64(1)))
     cuts = [np.arange(turn, end, group_size(len(order))) for turn, end in zip(turns, np.append(turns[1:], len(order)))]
     starts = np.concatenate(cuts)
     ends = np.append(starts[1:], len(order))
-    ordered = receivers.positions[order]
-    width = np.maximum.reduceat(ordered, starts) - np.minimum.reduceat(ordered, starts)
-    is_narrow = width.max(axis=1) <= WIDEST * extent
+    is_narrow = np.ones(len(starts), bool)
+    for axis in receivers.positions.T:
+        ordered = axis[order]
+        is_narrow &= np.maximum.reduceat(ordered, starts) - np.minimum.reduceat(ordered, starts) <= WIDEST * extent
     return order, starts[is_narrow], ends[is_narrow]
 
 

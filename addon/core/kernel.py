@@ -165,20 +165,20 @@ class KernelScene:
         return moments, sum(self.workers.each_range(len(moments), 64, call))
 
     def gather(
-        self, solution, texel_light, emitters, receivers, guides, selected, replicates, first, count, seed, io_sums,
-        on_step=None,
-    ):  # fmt: skip
-        """Add the radiosity that each selected receiver's rays see to io_sums, float32 (N, replicates, 3).
+        self, solution, texel_light, emitters, receivers, guides, selected, first, count, seed, io_sums, on_step=None
+    ):
+        """Add the radiosity that each selected receiver's rays see to io_sums, a gather_sums.GatherSums.
 
         Returns the rays traced. ``solution`` is a patch_solution.PatchSolution, ``guides`` a guides.Guides.
         """
         seen, on_texels, lights, where = (x.arrays() for x in (solution, texel_light, emitters, receivers))
-        guiding = guides.arrays()
+        guiding, sums = guides.arrays(), io_sums.arrays()
+        replicates = io_sums.luminances.shape[1]
 
         def call(start, stop):
             return _kernel.gather(
                 self._scene, self._patches, seen, on_texels, lights, where, guiding, selected[start:stop], replicates,
-                first, count, seed, io_sums,
+                first, count, seed, sums,
             )  # fmt: skip
 
         size = max(64, min(4096, (1 << 17) // (replicates * count)))

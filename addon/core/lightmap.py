@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import Charts
 from .gaps import fill_gaps
 from .scene import exitance_from_radiance, radiance_from_exitance
-from .texels import TexelMap
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,14 +24,16 @@ class Lightmap:
     uvs: np.ndarray
 
 
-def assemble(irradiance: np.ndarray, texel_map: TexelMap, charts: Charts) -> Lightmap:
-    """The lightmap of receivers' irradiance (N, 3) [W/m^2]; no texel stays empty, so that mipmaps see no black."""
-    pixels = np.zeros((charts.height, charts.width, 3), np.float32)
-    pixels[texel_map.rows, texel_map.columns] = radiance_from_exitance(irradiance)
-    is_set = np.zeros(pixels.shape[:2], bool)
-    is_set[texel_map.rows, texel_map.columns] = True
+def assemble(irradiance: np.ndarray, cells: np.ndarray, uvs: np.ndarray) -> Lightmap:
+    """The lightmap of receivers' irradiance (N, 3) [W/m^2]; no texel stays empty, so that mipmaps see no black.
+
+    ``cells`` int32 (H, W) is the receiver that each texel is, -1 for none, ``uvs`` the corners' in texels (T, 3, 2).
+    """
+    height, width = cells.shape
+    pixels, is_set = np.zeros((height, width, 3), np.float32), cells >= 0
+    pixels[is_set] = radiance_from_exitance(irradiance)[cells[is_set]]
     fill_gaps(pixels, is_set)
-    return Lightmap(pixels, charts.uvs / np.float32([charts.width, charts.height]))
+    return Lightmap(pixels, uvs / np.float32([width, height]))
 
 
 def look_up(lightmap: Lightmap, triangles, barycentrics):

@@ -10,7 +10,8 @@ import numpy as np
 
 from .allocation import measured_errors, next_pass, rays_due
 from .denoising import denoised
-from .gather_job import REPLICATES, GatherJob, estimate_of
+from .gather_job import REPLICATES, GatherJob
+from .gather_sums import no_sums
 from .measuring import probes_among
 from .probes import Probes, rms_of
 from .relative import scale_of
@@ -42,7 +43,6 @@ class Gathered:
 
     Attributes
     ----------
-    job : whose rays see the light that was found last
     values : float32 (N, 3) irradiance [W/m^2]
     rms : its relative error, as measured
     stopped : what ended the passes, "" where nothing was left to do
@@ -50,7 +50,6 @@ class Gathered:
     rays, probe_rays : traced by the passes, and to measure the error
     """
 
-    job: GatherJob
     values: np.ndarray
     rms: float
     stopped: str
@@ -60,10 +59,10 @@ class Gathered:
 
 
 class _Samples:
-    """The rays of all passes: sums (N, R, 3), how many of a replicate each receiver has (N,), how many were traced."""
+    """The rays of all passes: their sums, how many of a replicate each receiver has (N,), how many were traced."""
 
     def __init__(self, count: int):
-        self.sums, self.taken, self.rays = np.zeros((count, REPLICATES, 3), np.float32), np.zeros(count, np.int64), 0
+        self.sums, self.taken, self.rays = no_sums(count, REPLICATES), np.zeros(count, np.int32), 0
 
     def add(self, job: GatherJob, active, further, seed, on_step) -> None:
         """Trace ``further`` (N,) rays of every replicate at the ``active`` receivers (K,), those of a kind at once."""
@@ -74,6 +73,11 @@ class _Samples:
             self.rays += job.gather(group, int(first), int(count), seed, self.sums, within(on_step, done, share))
             done += share
         self.taken[active] += further[active]
+
+    @property
+    def light(self):
+        """What is gathered, float32 (N, 3): made of the sums when it is asked for, as it takes half their memory."""
+        return self.sums.means(self.taken)
 
     @property
     def cost(self) -> float:
@@ -112,6 +116,8 @@ def gather_until(
 ) -> Gathered:
     """Gather until the error is the target, or further rays no longer help or cannot be afforded.
 
+    In the end the job's rays see what was gathered.
+
     Parameters
     ----------
     grid, denoise, error, seconds_left : as in gather.gather_irradiance
@@ -123,7 +129,7 @@ def gather_until(
     samples, probes = _Samples(count), None
     fewest = LEAST_FIRST if grid and count >= MANY_TEXELS else MOST_FIRST
     first = first_rays(fewest, error, pace * seconds_left() / (REPLICATES * count))
-    active, further = np.arange(count), np.full(count, first)
+    active, further = np.arange(count), np.full(count, first, np.int32)
     aim = AIM if denoise is None or grid is None else DENOISED_AIM
     budget, idle, begin, rms, is_first = 0, 0, 0.0, np.inf, True
     while True:
@@ -133,18 +139,12 @@ def gather_until(
         begin += width
         del active, further
         budget = budget or ray_budget(samples.rays * fewest / first, error)
-        gathered, variance = estimate_of(samples.sums, samples.taken)
-        near = None
-        if grid:
-            # blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while
-            # smoothing that minds values would take some of a few rays' light away
-            near = blurred(job.kernel.workers, grid, job.receivers, gathered)
-            job = job.seeing(grid, direct, near)
+        scales = _show_what_was_gathered(job, grid, samples, direct)
         probes = probes or probes_among(job, error, seed + 1)
-        found = _best_estimate(job, grid, gathered, variance, near, samples.taken, direct, probes)
+        found = _best_estimate(job, grid, samples, scales, direct, probes)
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
-            found, aim = _denoised(denoise, grid, found, gathered, direct, probes), AIM
+            found, aim = _denoised(denoise, grid, found, samples, direct, probes), AIM
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
         if rms <= error and not is_first:
@@ -155,11 +155,13 @@ def gather_until(
             due = _due(found, samples, probes, error, aim, direct_rms)
             in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
             active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
+            del due
         is_first = False
         if stopped is not None:
-            found = found if is_asked else _denoised(denoise, grid, found, gathered, direct, probes)
+            found = found if is_asked else _denoised(denoise, grid, found, samples, direct, probes)
             traced = samples.rays, probes.measured.rays
-            return Gathered(job, found.values, found.rms, stopped, found.is_denoised, *traced)
+            return Gathered(found.values, found.rms, stopped, found.is_denoised, *traced)
+        del found, scales  # a fine lightmap's are a gigabyte, which the next estimate needs
 
 
 def first_rays(fewest, error, in_time) -> int:
@@ -173,30 +175,43 @@ def ray_budget(fewest_cost, error) -> int:
     return int(max(MOST_COST * fewest_cost, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
 
 
-def _best_estimate(job: GatherJob, grid, values, variance, near, taken, direct, probes: Probes) -> _Found:
-    """What gathered light (N, 3) of a variance (N,) comes to; ``near`` is the same blurred.
+def _show_what_was_gathered(job: GatherJob, grid, samples: _Samples, direct):
+    """Let rays see it; what errors of it are relative to (N,), None where there is no grid."""
+    if grid is None:
+        return None
+    # blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while smoothing
+    # that minds values would take some of a few rays' light away
+    near = blurred(job.kernel.workers, grid, job.receivers, samples.light)
+    job.show(grid, direct, near)
+    return scale_of(near)
+
+
+def _best_estimate(job: GatherJob, grid, samples: _Samples, scales, direct, probes: Probes) -> _Found:
+    """What gathered light comes to, with what it is relative to (N,).
 
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
     """
-    workers, receivers = job.kernel.workers, job.receivers
+    workers, receivers, taken = job.kernel.workers, job.receivers, samples.taken
+    variance = samples.sums.variances(taken)
 
     def found_by(gathered, noise):
-        lit = (direct + gathered).astype(np.float32)
+        lit = direct + gathered
         relative = (np.sqrt(job.weights * noise) / scale_of(lit)).astype(np.float32)
         return _Found(lit, relative, probes.squares_of(lit))
 
-    as_it_is = found_by(values, pooled(workers, None, receivers, variance * taken) / taken)
-    if grid is None:
-        return as_it_is
-    other = found_by(*smoothed(workers, grid, receivers, values, variance, near, taken))
-    return min(as_it_is, other, key=lambda estimate: estimate.rms)
+    as_it_is = rms_of(probes.squares_of(direct + samples.light))
+    if grid is not None:
+        smooth = found_by(*smoothed(workers, grid, receivers, samples.light, variance, scales, taken))
+        if smooth.rms < as_it_is:
+            return smooth
+    return found_by(samples.light, pooled(workers, None, receivers, variance * taken) / taken)
 
 
-def _denoised(denoise, grid, found: _Found, gathered, direct, probes: Probes) -> _Found:
+def _denoised(denoise, grid, found: _Found, samples: _Samples, direct, probes: Probes) -> _Found:
     """What the denoiser makes of it, where there is one and the probes find it better."""
     if denoise is None or grid is None:
         return found
-    values = denoised(denoise, grid, found.values, direct, gathered, probes.receivers, probes.measured)
+    values = denoised(denoise, grid, found.values, direct, samples.light, probes.receivers, probes.measured)
     other = replace(found, values=values, squares=probes.squares_of(values), is_denoised=True)
     return min(found, other, key=lambda estimate: estimate.rms)
 
@@ -207,10 +222,10 @@ def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, direct_rm
     A speckle is a receiver whose noise is seen then, as a soft dot that smoothing has made of it.
     """
     if found.rms <= error:
-        return np.where(found.noise > SPECKLE * error, np.inf, 0.0)
+        return np.where(found.noise > SPECKLE * error, np.float32(np.inf), np.float32(0))
     errors = measured_errors(found.noise, probes.receivers, found.squares)
     errors, aimed_at = _gathered_part(errors, found.rms, aim * error, direct_rms)
-    return rays_due(errors, samples.taken, aimed_at)
+    return rays_due(errors, samples.taken, aimed_at).astype(np.float32)
 
 
 def _gathered_part(errors, rms, target, direct_rms):
@@ -223,12 +238,12 @@ def _next(due, samples: _Samples, is_met, rays_left, rays_in_time):
     """The receivers of the next pass (K,), further rays of each (N,), and what stops it, None where nothing does."""
     if is_met:
         rays_left = min(rays_left, SPECKLE_SHARE * samples.rays)
-    wanting, _ = next_pass(due, samples.taken, MOST_RAYS, samples.cost, np.inf)
+    wanting = len(next_pass(due, samples.taken, MOST_RAYS, samples.cost, np.inf)[0])
     active, further = next_pass(due, samples.taken, MOST_RAYS, samples.cost, min(rays_left, rays_in_time))
-    if len(wanting) and len(active) >= ENOUGH * len(wanting):
+    if wanting and len(active) >= ENOUGH * wanting:
         return active, further, None
     if is_met:
         return active, further, ""
-    if not len(wanting):
+    if not wanting:
         return active, further, "as receivers have the most rays that they may"
     return active, further, "by the time limit" if rays_in_time < rays_left else "by the budget of rays"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .emitters import Emitters
+from .gather_sums import no_sums
 from .guides import no_guides
 from .kernel import KernelScene
 from .patch_solution import EVEN, PatchSolution
@@ -102,12 +103,12 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, coun
     )
     for chosen, points, _ in _measured(patches, wanted):
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
-        sums = np.zeros((len(receivers), 1, 3), np.float32)
+        sums = no_sums(len(receivers), 1)
         everyone = np.arange(len(receivers), dtype=np.uint32)
         rays += kernel.gather(
-            black, NO_TEXEL_LIGHT, emitters, receivers, no_guides(len(receivers)), everyone, 1, 0, count, seed, sums
+            black, NO_TEXEL_LIGHT, emitters, receivers, no_guides(len(receivers)), everyone, 0, count, seed, sums
         )
-        irradiance[chosen] = (sums[:, 0] / count).reshape(-1, 2, points, 3).mean(axis=2, dtype=np.float64)
+        irradiance[chosen] = sums.means(count).reshape(-1, 2, points, 3).mean(axis=2, dtype=np.float64)
     return irradiance.reshape(-1, 3), rays
 
 

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .charts import Charts
 from .emitters import LUMINANCE
 from .receivers import CornerMeans, Receivers, surface_receivers
 from .relative import scale_of
 from .scene import Scene
-from .texels import TexelMap
 
 LEAST_PROBES, MOST_PROBES = 512, 2048
 PROBE_OF = 64  # receivers that one stands for, between these: measuring is not to take longer than baking
@@ -100,24 +98,27 @@ def chosen_receivers(count: int):
     return np.unique(np.linspace(0, count - 1, min(probe_count(count), count)).round().astype(np.uint32))
 
 
-def seen_through_lightmap(scene: Scene, charts: Charts, texel_map: TexelMap, seed: int) -> SeenPoints:
-    """Points that are looked up in a lightmap bilinearly, as a viewer does."""
-    is_laid_out = np.isfinite(charts.uvs).all(axis=(1, 2))
-    triangles, barycentrics = _random_points(scene, is_laid_out, probe_count(len(texel_map)), seed)
-    grid = np.full((texel_map.height, texel_map.width), -1, np.int32)
-    grid[texel_map.rows, texel_map.columns] = np.arange(len(texel_map))
-    places = np.einsum("nk,nkc->nc", barycentrics, charts.uvs[triangles].astype(np.float64)) - 0.5
+def seen_through_lightmap(scene: Scene, cells: np.ndarray, uvs: np.ndarray, seed: int) -> SeenPoints:
+    """Points that are looked up in a lightmap bilinearly, as a viewer does.
+
+    ``cells`` int32 (H, W) is the receiver that each texel is, -1 for none, ``uvs`` the corners' in texels (T, 3, 2).
+    """
+    height, width = cells.shape
+    is_laid_out = np.isfinite(uvs).all(axis=(1, 2))
+    count = probe_count(np.count_nonzero(cells >= 0))
+    triangles, barycentrics = _random_points(scene, is_laid_out, count, seed)
+    places = np.einsum("nk,nkc->nc", barycentrics, uvs[triangles].astype(np.float64)) - 0.5
     low = np.floor(places).astype(np.int64)
     shares = places - low
     indices, weights = [], []
     for row in (0, 1):
         for column in (0, 1):
-            x = np.clip(low[:, 0] + column, 0, texel_map.width - 1)
-            y = np.clip(low[:, 1] + row, 0, texel_map.height - 1)
+            x = np.clip(low[:, 0] + column, 0, width - 1)
+            y = np.clip(low[:, 1] + row, 0, height - 1)
             across = shares[:, 0] if column else 1 - shares[:, 0]
             weight = across * (shares[:, 1] if row else 1 - shares[:, 1])
-            indices.append(np.maximum(grid[y, x], 0))
-            weights.append(np.where(grid[y, x] >= 0, weight, 0.0))
+            indices.append(np.maximum(cells[y, x], 0))
+            weights.append(np.where(cells[y, x] >= 0, weight, 0.0))
     indices, weights = np.stack(indices, axis=1), np.stack(weights, axis=1)
     weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
     receivers = surface_receivers(scene, triangles, barycentrics)

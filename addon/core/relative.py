@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from .emitters import LUMINANCE
+from .emitters import luminance_of
 
 DARK = 0.3  # of the median irradiance: what is added to a point's own before its error is called relative
 
 
 def scale_of(irradiance):
     """The luminance, and a share of its median where that is dark: irradiance (N, 3) -> (N,) [W/m^2]."""
-    return scale_of_luminance(irradiance @ LUMINANCE)
+    return scale_of_luminance(luminance_of(irradiance))
 
 
 def scale_of_luminance(luminance):

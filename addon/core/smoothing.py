@@ -11,16 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from .charts import Charts
-from .emitters import LUMINANCE
+from .emitters import luminance_of
+from .gather_sums import LARGEST_VARIANCE
 from .kernel import clamp_outliers, smooth
 from .receivers import Receivers
-from .relative import scale_of
 from .scene import Scene
 from .texels import TexelMap
 from .textures import textured_colours
 from .workers import Workers
 
-LARGEST_VARIANCE = 1e34  # whatever shines: the sum of some remains a float32
 STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
 KEPT = 16  # texels to every side of each, over which smoothing is made to keep the light,
 MOST_KEPT = 0.5  # of what it left more or less, at the most
@@ -50,12 +49,11 @@ class TexelGrid:
 
 def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Receivers) -> TexelGrid:
     """The grid that a lightmap's receivers lie in."""
-    grid = np.full((texel_map.height, texel_map.width), -1, np.int32)
-    grid[texel_map.rows, texel_map.columns] = np.arange(len(texel_map))
-    apart = np.concatenate([_apart(grid[row : row + BAND], receivers.positions) for row in range(0, len(grid), BAND)])
+    cells = texel_map.cells
+    apart = np.concatenate([_apart(cells[row : row + BAND], receivers.positions) for row in range(0, len(cells), BAND)])
     spacing = float(np.median(apart)) if len(apart) else 1.0
     colours = textured_colours(scene, texel_map.triangles, texel_map.barycentrics, "reflectance", "reflectance_texture")
-    return TexelGrid(grid, spacing, charts.uvs, np.clip(colours, 0, 1), texel_map.shown)
+    return TexelGrid(cells, spacing, charts.uvs, np.clip(colours, 0, 1), texel_map.shown)
 
 
 def _apart(rows, positions):
@@ -82,54 +80,63 @@ def pooled(workers: Workers, grid: TexelGrid | None, receivers: Receivers, of_on
     return smooth(workers, grid, receivers, np.repeat(of_one_ray[:, None], 3, axis=1), of_one_ray, 1, False)[0][:, 0]
 
 
-def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, variances, near, taken):
+def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, variances, scales, taken):
     """Gathered light (N, 3) smoothed by its variances (N,): values float32 (N, 3), variance of luminance (N,).
 
-    ``near`` (N, 3) is the light ``blurred``, ``taken`` (N,) how many rays each is of. What is left standing alone is
-    clamped, which the variance does not tell.
+    ``scales`` (N,) are those of the light ``blurred``, ``taken`` (N,) how many rays each is of. What is left standing
+    alone is clamped, which the variance does not tell.
     """
-    variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
     # pooled relative to the light there, as the noise of what is bright says nothing of the calm beside it
-    scales = scale_of(near)
-    relative = pooled(workers, grid, receivers, variances / scales**2 * taken) / taken
-    noise = np.minimum(relative * scales**2, LARGEST_VARIANCE).astype(np.float32)
-    del scales, relative
-    smooth_values, left = values, noise
+    relative = pooled(workers, grid, receivers, variances / np.square(scales, dtype=np.float64) * taken) / taken
+    noise = np.minimum(relative * np.square(scales, dtype=np.float64), LARGEST_VARIANCE).astype(np.float32)
+    del relative
+    before, left = luminance_of(values), noise
     for step in STEPS:
-        smooth_values, left = smooth(workers, grid, receivers, smooth_values, left, step, True)
+        values, left = smooth(workers, grid, receivers, values, left, step, True)
     # by their own noise: pooled, what is far off by chance is as certain as its neighbours
-    smooth_values = clamp_outliers(workers, grid, receivers, smooth_values, variances)
-    return kept(grid, values, smooth_values, np.sqrt(noise)), left
+    values = clamp_outliers(workers, grid, receivers, values, variances)
+    values *= restoring(grid, before, luminance_of(values), np.sqrt(noise))[:, None]
+    return values, left
 
 
-def kept(grid: TexelGrid, values, smooth_values, deviations):
-    """Smoothed light (N, 3), scaled so that around every texel there is about as much as there was in ``values``.
+def restoring(grid: TexelGrid, before, luminance, deviations):
+    """What smoothed luminance (N,) is to be multiplied with (N,), so that around every texel is as much as ``before``.
 
     Most rays see less than the mean and few see much more. Smoothing that minds values takes these few for something
     else, and the light for less than it is, by the more the noisier it was: ``deviations`` (N,) say where to put it.
     What noise is common to both falls out of their difference. Charts that lie side by side share what they lost: calm
     ones get little of it.
     """
-    luminance = (smooth_values @ LUMINANCE).astype(np.float32)
-    given, noise = _around(grid, values @ LUMINANCE - luminance), np.maximum(_around(grid, deviations), deviations)
-    given *= deviations / np.where(noise > 0, noise, 1)
+    given, shares = _around(grid, before - luminance), np.maximum(_around(grid, deviations), deviations)
+    np.divide(deviations, shares, out=shares, where=shares > 0)
+    given *= shares
     # what is dimmer than rounding beside what is bright has no share that means something
-    given = np.clip(given, -MOST_KEPT * luminance, MOST_KEPT * luminance)
-    return (1 + given / np.where(luminance > 0, luminance, 1))[:, None] * smooth_values
+    most = MOST_KEPT * luminance
+    np.clip(given, -most, most, out=given)
+    np.divide(given, luminance, out=given, where=luminance > 0)
+    return 1 + given
 
 
 def _around(grid: TexelGrid, luminance):
     """Sums float32 (N,) of luminance (N,) over the square of texels around each receiver, KEPT to every side."""
-    is_set = grid.receivers >= 0
-    order = grid.receivers[is_set]
-    image = np.zeros(is_set.shape)
-    image[is_set] = luminance[order]
-    for axis in (0, 1):
-        until = np.insert(np.cumsum(image, axis), 0, 0.0, axis)
-        at = np.arange(image.shape[axis])
-        first, last = np.maximum(at - KEPT, 0), np.minimum(at + KEPT + 1, len(at))
-        image = until.take(last, axis)
-        image -= until.take(first, axis)
-    sums = np.zeros(len(luminance), np.float32)
-    sums[order] = image[is_set]
+    sums, height = np.zeros(len(luminance), np.float32), len(grid.receivers)
+    for top in range(0, height, BAND):
+        band = slice(top, min(top + BAND, height))
+        above, below = min(KEPT, top), min(KEPT, height - band.stop)
+        cells = grid.receivers[top - above : band.stop + below]
+        image = np.where(cells >= 0, luminance[cells], 0.0)
+        for axis in (0, 1):
+            image = _over_window(image, axis)
+        rows, image = grid.receivers[band], image[above : len(image) - below]
+        sums[rows[rows >= 0]] = image[rows >= 0]
+    return sums
+
+
+def _over_window(image, axis):
+    """Sums float64 over each pixel of an image and the KEPT to either side of it, along an axis."""
+    until = np.insert(np.cumsum(image, axis, np.float64), 0, 0.0, axis)
+    at = np.arange(image.shape[axis])
+    first, last = np.maximum(at - KEPT, 0), np.minimum(at + KEPT + 1, len(at))
+    sums = until.take(last, axis)
+    sums -= until.take(first, axis)
     return sums

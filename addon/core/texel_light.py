@@ -13,7 +13,7 @@ LIFT = 0.1  # texels above the surface, where it is looked for what stands on it
 SPREAD = 2  # texels that light is blurred over before rays see it
 BAND = 256  # rows of the grid at once
 BUT_SIGN = np.uint32((1 << 31) - 1)
-NO_LIGHT = np.uint64((1 << 64) - 1)
+NO_LIGHT, SPLIT = np.uint64((1 << 64) - 1), np.uint64(1 << 63)
 TOUCHING = 2.0  # texels: receivers that are further apart are not neighbours, though their texels are
 
 
@@ -26,7 +26,7 @@ class TexelLight:
     uvs : float32 (T, 3, 2) of the scene's triangles' corners, in texels; NaN without a place
     receivers : int32 (height, width) which receiver each texel is, -1 for none
     is_split : bool (height, width) whether rays that hit it go on, from however far they come
-    light : uint64 (height, width) reflected radiosity of the texels, as the kernel has it [W/m^2]
+    light : uint64 (height, width) reflected radiosity of the texels that was shown last, as the kernel has it [W/m^2]
     reach : rays that hit from nearer go on [m]
     """
 
@@ -36,10 +36,11 @@ class TexelLight:
     light: np.ndarray
     reach: float
 
-    def showing(self, radiosity) -> TexelLight:
-        """The same with the reflected radiosity float32 (N, 3) of the receivers [W/m^2]."""
-        of_all = np.append(packed(radiosity), NO_LIGHT)
-        return replace(self, light=of_all[self.receivers] | self.is_split.astype(np.uint64) << np.uint64(63))
+    def show(self, radiosity) -> None:
+        """From now on rays see the reflected radiosity float32 (N, 3) of the receivers [W/m^2]."""
+        # in place: to all that look, the light last shown is the one that counts, and two images would take the room
+        np.take(np.append(packed(radiosity), NO_LIGHT), self.receivers, out=self.light, mode="wrap")
+        self.light[self.is_split] |= SPLIT
 
     def looking_further(self, factor: float) -> TexelLight:
         """The same for rays that go on from further away."""
@@ -66,9 +67,11 @@ def packed(light):
     Rounded to 6e-5 of it, half to either side.
     """
     # the sign of -0.0 must not mark the texel, nor reach into the next channel
-    bits = (np.ascontiguousarray(light, np.float32).view(np.uint32) & BUT_SIGN).astype(np.uint64)
-    red, green, blue = ((bits + np.uint64(1 << 9)) >> np.uint64(10)).T
-    return red | green << np.uint64(21) | blue << np.uint64(42)
+    bits = np.ascontiguousarray(light, np.float32).view(np.uint32) & BUT_SIGN
+    bits += np.uint32(1 << 9)
+    bits >>= np.uint32(10)
+    red, green, blue = bits.T
+    return red | green.astype(np.uint64) << np.uint64(21) | blue.astype(np.uint64) << np.uint64(42)
 
 
 def split_where_blocked(kernel: KernelScene, cells, receivers: Receivers, spacing: float):

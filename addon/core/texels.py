@@ -43,6 +43,13 @@ class TexelMap:
         return len(self.rows)
 
     @property
+    def cells(self):
+        """Which receiver each texel is, -1 for none: int32 (height, width)."""
+        cells = np.full((self.height, self.width), -1, np.int32)
+        cells[self.rows, self.columns] = np.arange(len(self))
+        return cells
+
+    @property
     def is_inside(self):
         """Whether texels' centres are inside the chart: bool (N,)."""
         return self.distances == 0

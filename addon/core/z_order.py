@@ -7,9 +7,15 @@ import numpy as np
 
 def z_order(*axes):
     """Place on the curve of points whose whole coordinates are ``axes``, each (N,): uint64 (N,) (Morton 1966)."""
-    axes = [np.asarray(axis, np.uint64) for axis in axes]
     places = np.zeros(len(axes[0]), np.uint64)
-    for bit in range(max(int(axis.max(initial=0)) for axis in axes).bit_length()):
-        for k, axis in enumerate(axes):
-            places |= (axis >> np.uint64(bit) & np.uint64(1)) << np.uint64(bit * len(axes) + k)
+    for k, axis in enumerate(axes):
+        places |= _spread(int(axis.max(initial=0)) + 1, len(axes), k)[axis]
     return places
+
+
+def _spread(count, step, first):
+    """Numbers 0 .. count - 1 whose bits stand ``step`` apart from the ``first`` on: uint64 (count,)."""
+    numbers, spread = np.arange(count, dtype=np.uint64), np.zeros(count, np.uint64)
+    for bit in range((count - 1).bit_length()):
+        spread |= (numbers >> np.uint64(bit) & np.uint64(1)) << np.uint64(bit * step + first)
+    return spread

@@ -315,7 +315,8 @@ pl_status pl_learn_guides(const pl_gather_scene *in, const pl_receivers *receive
  *   first, count   rays of each replicate, after the first ones that it already has. One scrambled Sobol sequence goes
  *                  through all receivers, count points each: receivers that follow each other share its even spread,
  *                  so that their mean is better than any of them (Ahmed & Wonka 2020, sec. 4)
- *   io_sums        3 * replicates per selected receiver's index: sums of radiosity over rays, added to
+ *   io_light       3 per selected receiver's index: the sum of radiosity over the rays of all replicates, added to
+ *   io_luminances  replicates per selected receiver's index: the sum of its luminance over those of each, added to
  *   out_rays       all rays traced, shadow rays and those that went on included
  */
 enum { PL_MAX_REPLICATES = 8 };
@@ -326,7 +327,8 @@ typedef struct pl_gather_rays {
     uint32_t seed;
 } pl_gather_rays;
 pl_status pl_gather(const pl_gather_scene *in, const pl_receivers *receivers, const pl_guides *guides,
-                    const uint32_t *selected, size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays);
+                    const uint32_t *selected, size_t count, pl_gather_rays rays, float *io_light, float *io_luminances,
+                    uint64_t *out_rays);
 
 /*
  * Direct irradiance from the lights: shadow rays, emitters chosen by what they would give unoccluded.

@@ -100,8 +100,8 @@ static void view_gather(const door_array *arrays, const pl_scene *scene, const p
 }
 
 PyObject *door_gather(PyObject *self, PyObject *args) {
-    enum { GROUPS = GATHER_ARRAY_COUNT, SHARES, SELECTED, SUMS, ARRAYS };
-    PyObject *capsules[2], *tuples[3], *guide_arrays, *objects[ARRAYS];
+    enum { GROUPS = GATHER_ARRAY_COUNT, SHARES, SELECTED, LIGHT, LUMINANCES, ARRAYS };
+    PyObject *capsules[2], *tuples[3], *guide_arrays, *sums, *objects[ARRAYS];
     pl_gather_rays rays;
     int width;
     float reach;
@@ -110,7 +110,7 @@ PyObject *door_gather(PyObject *self, PyObject *args) {
     (void)self;
     if (!PyArg_ParseTuple(args, "OOO(OOif)OOOOIIIIO", &capsules[0], &capsules[1], &tuples[0], &objects[TEXELS_AT],
                           &objects[TEXELS_AT + 1], &width, &reach, &tuples[1], &tuples[2], &guide_arrays,
-                          &objects[SELECTED], &rays.replicates, &rays.first, &rays.count, &rays.seed, &objects[SUMS]))
+                          &objects[SELECTED], &rays.replicates, &rays.first, &rays.count, &rays.seed, &sums))
         return NULL;
     const pl_scene *scene = PyCapsule_GetPointer(capsules[0], SCENE);
     const pl_patches *patches = door_patches(scene, capsules[1]);
@@ -119,11 +119,12 @@ PyObject *door_gather(PyObject *self, PyObject *args) {
                            {"guide_groups", 'i', 1, AS_MANY_ROWS_AS(RECEIVERS_AT), false, {0}},
                            {"guide_shares", 'f', PL_GUIDE_CELLS, -1, false, {0}},
                            {"selected", 'I', 1, -1, false, {0}},
-                           {"io_sums", 'f', 3, -1, true, {0}}};
+                           {"io_light", 'f', 3, AS_MANY_ROWS_AS(RECEIVERS_AT), true, {0}},
+                           {"io_luminances", 'f', 1, -1, true, {0}}};
     if (!patches || !unpack_gather(tuples, objects) || !unpack(guide_arrays, 2, objects + GROUPS) ||
-        !door_arrays(objects, arrays, ARRAYS))
+        !unpack(sums, 2, objects + LIGHT) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
-    if (!door_has_numbers(&arrays[SUMS], 3 * (size_t)rays.replicates * door_rows(&arrays[RECEIVERS_AT]))) {
+    if (!door_has_numbers(&arrays[LUMINANCES], (size_t)rays.replicates * door_rows(&arrays[RECEIVERS_AT]))) {
         door_release(arrays, ARRAYS);
         return NULL;
     }
@@ -133,7 +134,7 @@ PyObject *door_gather(PyObject *self, PyObject *args) {
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_gather(&in.scene, &in.receivers, &guides, arrays[SELECTED].view.buf, door_rows(&arrays[SELECTED]), rays,
-                       arrays[SUMS].view.buf, &traced);
+                       arrays[LIGHT].view.buf, arrays[LUMINANCES].view.buf, &traced);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, ARRAYS);

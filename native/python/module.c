@@ -176,8 +176,8 @@ static PyMethodDef methods[] = {
      "shoot(scene, patches, sides, first_samples, ray_flux, first_rays, first, count, seed, io_received, "
      "io_escaped)"},
     {"gather", door_gather, METH_VARARGS,
-     "gather(scene, patches, solution, lights, receivers, guides, selected, replicates, first, count, seed, io_sums) "
-     "-> rays"},
+     "gather(scene, patches, solution, lights, receivers, guides, selected, replicates, first, count, seed, "
+     "(io_light, io_luminances)) -> rays"},
     {"learn_guides", door_learn_guides, METH_VARARGS,
      "learn_guides(scene, patches, solution, lights, receivers, members, first_members, first, count, rays, seed, "
      "out_moments) -> rays"},

@@ -203,7 +203,8 @@ static bool guides_fit(const pl_guides *guides, const uint32_t *selected, size_t
 }
 
 pl_status pl_gather(const pl_gather_scene *in, const pl_receivers *receivers, const pl_guides *guides,
-                    const uint32_t *selected, size_t count, pl_gather_rays rays, float *io_sums, uint64_t *out_rays) {
+                    const uint32_t *selected, size_t count, pl_gather_rays rays, float *io_light, float *io_luminances,
+                    uint64_t *out_rays) {
     gather_job job;
     const pl_status status = begin(&job, in, receivers, selected, count);
     if (status != PL_OK)
@@ -219,14 +220,15 @@ pl_status pl_gather(const pl_gather_scene *in, const pl_receivers *receivers, co
         vec3_basis(frame.shading, &u, &v);
         for (uint32_t replicate = 0; replicate < rays.replicates; ++replicate) {
             const uint32_t seed = hash_pair(hash_pair(rays.seed, replicate), hash_pair(rays.first, rays.count));
-            float *sum = io_sums + 3 * ((size_t)selected[i] * rays.replicates + replicate);
+            float *replicate_sum = io_luminances + (size_t)selected[i] * rays.replicates + replicate;
             for (uint32_t j = 0; j < rays.count; ++j) {
                 const uint32_t k = selected[i] * rays.count + j;
                 float x = sobol(k, 0, seed), y = sobol(k, 1, seed), seen[3] = {0, 0, 0};
                 const float share = guide_warp(&by, &x, &y), weight[3] = {share, share, share};
                 gather_ray(&job, &frame, cosine_direction(x, y, u, v, frame.shading),
                            (ray_random){hash_pair(seed, k), 0}, seen);
-                add(sum, seen, weight);
+                add(io_light + 3 * (size_t)selected[i], seen, weight);
+                *replicate_sum += share * luminance(seen);
             }
         }
     }

@@ -23,6 +23,7 @@ from patchlight.core import kernel as kernel_module
 from patchlight.core.emitters import emitters_of
 from patchlight.core.gather import NEAR
 from patchlight.core.gather_job import REPLICATES
+from patchlight.core.gather_sums import no_sums
 from patchlight.core.guides import learn_guides
 from patchlight.core.radiosity import solve_radiosity
 from patchlight.core.receivers import surface_receivers
@@ -92,14 +93,15 @@ def kernels(scene, settings, workers, count):
     receivers = everywhere.part(np.unique(np.linspace(0, len(texel_map) - 1, min(count, len(texel_map))).astype(int)))
     kernel = kernel_module.KernelScene(scene, workers)
     is_split = split_where_blocked(kernel, grid.receivers, everywhere, grid.spacing)
-    light = texel_light(grid.uvs, grid.receivers, is_split, NEAR * grid.spacing).showing(ones)
+    light = texel_light(grid.uvs, grid.receivers, is_split, NEAR * grid.spacing)
+    light.show(ones)
     solved = solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), settings, lambda done: None)
     guides, _ = learn_guides(kernel, solved.patches, light, solved.sources, receivers, 3)
     everyone = np.arange(len(receivers), dtype=np.uint32)
 
     def gather():
-        sums = np.zeros((len(receivers), REPLICATES, 3), np.float32)
-        kernel.gather(solved.patches, light, solved.sources, receivers, guides, everyone, REPLICATES, 0, RAYS, 1, sums)
+        sums = no_sums(len(receivers), REPLICATES)
+        kernel.gather(solved.patches, light, solved.sources, receivers, guides, everyone, 0, RAYS, 1, sums)
 
     return {"direct": lambda: kernel.direct(solved.sources, receivers, SHADOW_SAMPLES, 1), "gather": gather}
 

@@ -7,6 +7,7 @@ from addon.core import patches as patches_of_one_size
 from addon.core import radiosity
 from addon.core.decomposition import MOST_ALONG, finer, patches_at
 from addon.core.emitters import LUMINANCE, emitters_of
+from addon.core.gather_sums import no_sums
 from addon.core.guides import no_guides
 from addon.core.patches import cut, grid_of, patch_size_for, triangle_areas
 from addon.core.receivers import surface_receivers
@@ -104,11 +105,11 @@ def gathered_light(scene, kernel, triangles, weights):
     fine = BakeSettings(patch_size=patch_size_for(scene, 30_000), error=0.02)
     solved = radiosity.solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), fine, lambda done: None)
     receivers, count = surface_receivers(scene, triangles, weights), len(triangles)
-    sums, everyone = np.zeros((count, 1, 3), np.float32), np.arange(count, dtype=np.uint32)
+    sums, everyone = no_sums(count, 1), np.arange(count, dtype=np.uint32)
     kernel.gather(
-        solved.patches, NO_TEXEL_LIGHT, solved.sources, receivers, no_guides(count), everyone, 1, 0, 2048, 0, sums
+        solved.patches, NO_TEXEL_LIGHT, solved.sources, receivers, no_guides(count), everyone, 0, 2048, 0, sums
     )
-    return sums[:, 0] / 2048 + kernel.direct(solved.sources, receivers, 256, 0)[0]
+    return sums.means(2048) + kernel.direct(solved.sources, receivers, 256, 0)[0]
 
 
 def error_of_patches(solved, grid, along, triangles, weights, truth):

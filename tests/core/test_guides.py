@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from addon.core.emitters import emitters_of
+from addon.core.gather_sums import no_sums
 from addon.core.guides import EVEN, LEAST_GROUP, MOST_GROUP, WIDEST, _shares, group_size, learn_guides, no_guides
 from addon.core.kernel import GUIDE_CELLS
 from addon.core.radiosity import solve_radiosity
@@ -84,10 +85,10 @@ def test_guided_rays_find_the_same_light_with_less_noise():
     def both(kernel, solved, guides, rays):
         light = []
         for by in (no_guides(len(receivers)), guides):
-            sums = np.zeros((len(receivers), 4, 3), np.float32)
+            sums = no_sums(len(receivers), 4)
             everyone = np.arange(len(receivers), dtype=np.uint32)
-            kernel.gather(solved.patches, NO_TEXEL_LIGHT, solved.sources, receivers, by, everyone, 4, 0, 64, 9, sums)
-            light.append(sums[..., 1] / 64)
+            kernel.gather(solved.patches, NO_TEXEL_LIGHT, solved.sources, receivers, by, everyone, 0, 64, 9, sums)
+            light.append(sums.luminances / 64)
         return light
 
     plain, guided = learned(box_with_a_hole(GREY), receivers, both)

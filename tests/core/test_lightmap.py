@@ -5,29 +5,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from addon.core.charts import Charts
 from addon.core.lightmap import assemble
 from addon.core.settings import BakeSettings
-from addon.core.texels import TexelMap, texels
+from addon.core.texels import texels
 from addon.core.unwrap import unwrap
 from tests.core.meshes import box, rough_sheet, scene_of
 
-
-def map_of(rows, columns, width, height):
-    count = len(rows)
-    return TexelMap(
-        np.asarray(rows, np.int32),
-        np.asarray(columns, np.int32),
-        np.zeros(count, np.int32),
-        np.full((count, 3), 1 / 3, np.float32),
-        np.zeros(count, np.float32),
-        width,
-        height,
-    )
+NO_UVS = np.full((1, 3, 2), np.nan, np.float32)
 
 
-def empty_charts(width, height):
-    return Charts(np.full((1, 3, 2), np.nan, np.float32), np.full(1, -1, np.int32), width, height)
+def cells_of(rows, columns, width, height):
+    """Texels of a lightmap that are receivers, in this order."""
+    cells = np.full((height, width), -1, np.int32)
+    cells[rows, columns] = np.arange(len(rows))
+    return cells
 
 
 def bilinear(pixels, points):
@@ -48,7 +39,7 @@ def baked_positions(scene, charts):
     """A lightmap that holds positions [m], and the positions looked up at points inside charts."""
     texel_map = texels(charts)
     positions = np.einsum("nk,nkx->nx", texel_map.barycentrics.astype(float), scene.corners[texel_map.triangles])
-    return texel_map, assemble(np.pi * positions, texel_map, charts)
+    return texel_map, assemble(np.pi * positions, texel_map.cells, charts.uvs)
 
 
 def test_a_linear_function_of_position_is_looked_up_exactly_inside_charts():
@@ -81,14 +72,14 @@ def test_a_constant_is_looked_up_everywhere():
     scene = scene_of(rough_sheet(np.random.default_rng(2)), box())
     charts = unwrap(scene, BakeSettings(texels=1 << 13))
     texel_map = texels(charts)
-    lightmap = assemble(np.full((len(texel_map), 3), np.pi), texel_map, charts)
+    lightmap = assemble(np.full((len(texel_map), 3), np.pi), texel_map.cells, charts.uvs)
     # means of equal numbers, in float32
     assert lightmap.pixels == pytest.approx(1, abs=1e-5)
 
 
 def test_pixels_are_irradiance_over_pi_and_uvs_are_shares_of_the_image():
-    charts = Charts(np.float32([[[0.5, 0.5], [3.5, 0.5], [0.5, 1.5]]]), np.zeros(1, np.int32), 4, 2)
-    lightmap = assemble(np.array([[np.pi, 2 * np.pi, 0]]), map_of([1], [2], 4, 2), charts)
+    uvs = np.float32([[[0.5, 0.5], [3.5, 0.5], [0.5, 1.5]]])
+    lightmap = assemble(np.array([[np.pi, 2 * np.pi, 0]]), cells_of([1], [2], 4, 2), uvs)
     assert lightmap.pixels[1, 2] == pytest.approx([1, 2, 0])
     assert lightmap.uvs == pytest.approx(np.array([[[0.125, 0.25], [0.875, 0.25], [0.125, 0.75]]]))
     assert lightmap.pixels.dtype == lightmap.uvs.dtype == np.float32
@@ -102,7 +93,7 @@ def test_no_texel_stays_empty_and_none_leaves_the_range(width, height, seed, sha
     is_set[rng.integers(height), rng.integers(width)] = True
     rows, columns = np.nonzero(is_set)
     irradiance = np.pi * rng.uniform(2, 5, (len(rows), 3))
-    lightmap = assemble(irradiance, map_of(rows, columns, width, height), empty_charts(width, height))
+    lightmap = assemble(irradiance, cells_of(rows, columns, width, height), NO_UVS)
     # baked texels are left as they are
     assert (lightmap.pixels[rows, columns] == (irradiance / np.pi).astype(np.float32)).all()
     low, high = lightmap.pixels[rows, columns].min(axis=0), lightmap.pixels[rows, columns].max(axis=0)
@@ -112,12 +103,12 @@ def test_no_texel_stays_empty_and_none_leaves_the_range(width, height, seed, sha
 
 
 def test_the_first_ring_is_the_mean_of_the_neighbours():
-    lightmap = assemble(np.pi * np.array([[1.0] * 3, [3.0] * 3]), map_of([4, 4], [4, 6], 11, 9), empty_charts(11, 9))
+    lightmap = assemble(np.pi * np.array([[1.0] * 3, [3.0] * 3]), cells_of([4, 4], [4, 6], 11, 9), NO_UVS)
     assert lightmap.pixels[4, 5] == pytest.approx(2)  # between both
     assert lightmap.pixels[3, 3] == pytest.approx(1)
     assert lightmap.pixels[5, 7] == pytest.approx(3)
 
 
 def test_a_bake_without_receivers_is_black():
-    lightmap = assemble(np.zeros((0, 3)), map_of([], [], 5, 3), empty_charts(5, 3))
+    lightmap = assemble(np.zeros((0, 3)), cells_of([], [], 5, 3), NO_UVS)
     assert (lightmap.pixels == 0).all()

@@ -28,7 +28,7 @@ def test_a_lightmap_shows_a_linear_field_as_it_is():
     scene = closed_box()
     charts = unwrap(scene, BakeSettings(texels=1 << 14))
     texel_map = texels(charts)
-    seen = seen_through_lightmap(scene, charts, texel_map, 1)
+    seen = seen_through_lightmap(scene, texel_map.cells, charts.uvs, 1)
     corners = scene.corners[texel_map.triangles]
     values = smooth_field(np.einsum("nk,nkc->nc", texel_map.barycentrics.astype(np.float64), corners))
     shown = seen.look_up(values)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from addon.core.emitters import emitters_of
+from addon.core.gather_sums import no_sums
 from addon.core.guides import no_guides
 from addon.core.patch_solution import EVEN, PatchSolution
 from addon.core.patches import subdivide
@@ -51,7 +52,8 @@ def gathered_in_a_box(light, is_split):
     receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
     grid = texel_grid(scene, charts, texel_map, receivers)
     marks = np.full(grid.receivers.shape, is_split)
-    shown = texel_light(grid.uvs, grid.receivers, marks, 0.0).showing(np.tile(np.float32(light), (len(receivers), 1)))
+    shown = texel_light(grid.uvs, grid.receivers, marks, 0.0)
+    shown.show(np.tile(np.float32(light), (len(receivers), 1)))
     assert (shown.light[grid.receivers < 0] == NO_LIGHT).all()
     with kernel_of(scene) as kernel:
         patches = subdivide(scene, kernel, 0.5, 1000, 0)
@@ -60,13 +62,13 @@ def gathered_in_a_box(light, is_split):
             dark, dark, patches.reflectance, np.full(len(dark), EVEN, np.uint8), np.zeros(len(dark), np.float32),
             np.zeros((1, 3), np.float32),
         )  # fmt: skip
-        sums = np.zeros((len(receivers), 1, 3), np.float32)
+        sums = no_sums(len(receivers), 1)
         everyone = np.arange(len(receivers), dtype=np.uint32)
         kernel.gather(
-            field, shown, emitters_of(scene, kernel.centre), receivers, no_guides(len(receivers)), everyone, 1, 0,
+            field, shown, emitters_of(scene, kernel.centre), receivers, no_guides(len(receivers)), everyone, 0,
             count, 0, sums,
         )  # fmt: skip
-    return sums[:, 0] / count
+    return sums.means(count)
 
 
 def test_rays_find_the_light_of_texels():

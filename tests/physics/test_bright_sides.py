@@ -30,7 +30,8 @@ def texels_of(scene):
     receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
     grid = texel_grid(scene, charts, texel_map, receivers)
     light = texel_light(grid.uvs, grid.receivers, np.zeros(grid.receivers.shape, bool), reach=10.0)
-    return receivers, light.showing(np.zeros((len(receivers), 3), np.float32))
+    light.show(np.zeros((len(receivers), 3), np.float32))
+    return receivers, light
 
 
 @pytest.mark.parametrize("has_texels", [False, True], ids=["from patches", "from texel to texel"])

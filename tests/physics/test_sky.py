@@ -7,6 +7,7 @@ import pytest
 
 from addon.core.emitters import LUMINANCE, emitters_of
 from addon.core.environment import Environment
+from addon.core.gather_sums import no_sums
 from addon.core.guides import no_guides
 from addon.core.patch_solution import EVEN, PatchSolution
 from addon.core.patches import subdivide
@@ -84,12 +85,12 @@ def gathered(scene, receivers, sky, rays):
         field = PatchSolution(
             nothing, nothing, nothing[: len(patches)], np.full(sides, EVEN, np.uint8), np.zeros(sides, np.float32), sky
         )
-        sums = np.zeros((len(receivers), 1, 3), np.float32)
+        sums = no_sums(len(receivers), 1)
         everyone = np.arange(len(receivers), dtype=np.uint32)
         emitters = emitters_of(scene, kernel.centre)
         guides = no_guides(len(receivers))
-        kernel.gather(field, NO_TEXEL_LIGHT, emitters, receivers, guides, everyone, 1, 0, rays, 0, sums)
-    return sums[:, 0]
+        kernel.gather(field, NO_TEXEL_LIGHT, emitters, receivers, guides, everyone, 0, rays, 0, sums)
+    return sums.light
 
 
 def test_an_image_of_one_colour_is_a_world_of_one_colour():
