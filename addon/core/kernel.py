@@ -19,6 +19,7 @@ except ImportError as error:  # a source tree that has not been built, or a zip 
         f"Patchlight's native kernel cannot be loaded ({error}): install the zip of your platform, or run `make`"
     ) from error
 
+ROWS = 16  # of a lightmap are smoothed at once, where neighbours are a texel apart
 NO_OWNERS = np.zeros(0, np.int32)  # of pieces: each is a patch
 GUIDE_CELLS = 64  # PL_GUIDE_CELLS of native/include/patchlight.h
 
@@ -216,7 +217,7 @@ def smooth(workers, grid, receivers, values, variances, step, stops_on_value):
             stop - start, out_values, out_variances,
         )  # fmt: skip
 
-    workers.each_range(height, 16, call)
+    workers.each_range(height, ROWS * step, call)
     return out_values, out_variances
 
 
@@ -233,7 +234,7 @@ def clamp_outliers(workers, grid, receivers, values, variances):
             grid.receivers, width, height, grid.spacing, where, values, variances, start, stop - start, out
         )
 
-    workers.each_range(height, 16, call)
+    workers.each_range(height, ROWS, call)
     return out
 
 

@@ -387,10 +387,10 @@ pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t
  *   receivers       positions and shading normals: no smoothing across creases, steps, or charts
  *   values          3 per receiver
  *   variances       1 per receiver, of their luminance
- *   step            texels between the 5 x 5 taps: 1, 2, 4 ... for successive levels
+ *   step            texels between the 5 x 5 taps: 1, 2, 4 ... for successive levels, at most PL_WIDEST_STEP
  *   stops_on_value  0: geometry alone decides; else values further apart than their noise explains are not mixed, and
  *                   the noisier of two counts for four times the other's noise at the most
- *   first_row, row_count  the range
+ *   first_row, row_count  the range; one of many steps is the quickest, as rows a step apart share what they look at
  *   out_values, out_variances  at the receivers' indices; the variance of the weighted mean
  */
 typedef struct pl_texel_grid {
@@ -398,9 +398,10 @@ typedef struct pl_texel_grid {
     int32_t width, height;
     float spacing;
 } pl_texel_grid;
-void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values, const float *variances,
-               int32_t step, int32_t stops_on_value, int32_t first_row, int32_t row_count, float *out_values,
-               float *out_variances);
+#define PL_WIDEST_STEP (1 << 20)
+pl_status pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
+                    const float *variances, int32_t step, int32_t stops_on_value, int32_t first_row, int32_t row_count,
+                    float *out_values, float *out_variances);
 
 /*
  * What stands alone, brought back among its neighbours: a receiver's value is scaled so that its luminance is no more
@@ -410,7 +411,7 @@ void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const f
  *
  *   variances   1 per receiver, of its luminance before it was smoothed; else as of pl_smooth, and not in place
  */
-void pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
-                       const float *variances, int32_t first_row, int32_t row_count, float *out_values);
+pl_status pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
+                            const float *variances, int32_t first_row, int32_t row_count, float *out_values);
 
 #endif

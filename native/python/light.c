@@ -251,6 +251,7 @@ PyObject *door_smooth(PyObject *self, PyObject *args) {
     PyObject *receiver_arrays, *objects[ARRAYS];
     pl_texel_grid grid;
     int step, stops_on_value, first_row, row_count;
+    pl_status status;
     (void)self;
     if (!PyArg_ParseTuple(args, "OiifOOOiiiiOO", &objects[RECEIVER_ARRAY_COUNT], &grid.width, &grid.height,
                           &grid.spacing, &receiver_arrays, &objects[VALUES], &objects[VARIANCES], &step,
@@ -268,12 +269,12 @@ PyObject *door_smooth(PyObject *self, PyObject *args) {
     const pl_receivers receivers = receivers_of(arrays);
 
     Py_BEGIN_ALLOW_THREADS
-    pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value, first_row,
-              row_count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
+    status = pl_smooth(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, step, stops_on_value,
+                       first_row, row_count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, ARRAYS);
-    Py_RETURN_NONE;
+    return door_result(status);
 }
 
 PyObject *door_clamp_outliers(PyObject *self, PyObject *args) {
@@ -281,6 +282,7 @@ PyObject *door_clamp_outliers(PyObject *self, PyObject *args) {
     PyObject *receiver_arrays, *objects[ARRAYS];
     pl_texel_grid grid;
     int first_row, row_count;
+    pl_status status;
     (void)self;
     if (!PyArg_ParseTuple(args, "OiifOOOiiO", &objects[RECEIVER_ARRAY_COUNT], &grid.width, &grid.height, &grid.spacing,
                           &receiver_arrays, &objects[VALUES], &objects[VARIANCES], &first_row, &row_count,
@@ -297,10 +299,10 @@ PyObject *door_clamp_outliers(PyObject *self, PyObject *args) {
     const pl_receivers receivers = receivers_of(arrays);
 
     Py_BEGIN_ALLOW_THREADS
-    pl_clamp_outliers(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, first_row, row_count,
-                      arrays[OUT_VALUES].view.buf);
+    status = pl_clamp_outliers(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, first_row,
+                               row_count, arrays[OUT_VALUES].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, ARRAYS);
-    Py_RETURN_NONE;
+    return door_result(status);
 }

@@ -5,45 +5,42 @@
  * value driven by the estimated variance (Schied et al. 2017).
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
-#include "lights.h"
+#include "texel_rows.h"
 
 #include <math.h>
 
-enum { CHANNELS = 3, RADIUS = 2 };
-static const float spline[RADIUS + 1] = {0.375f, 0.25f, 0.0625f}; /* B3 spline, from the middle out */
+enum { CHANNELS = 3 };
+static const float spline[TEXEL_RADIUS + 1] = {0.375f, 0.25f, 0.0625f}; /* B3 spline, from the middle out */
 
-typedef struct smooth_job {
-    const pl_texel_grid *grid;
-    const pl_receivers *receivers;
-    const float *values, *variances;
-    int32_t step;
-    bool stops_on_value;
-} smooth_job;
-
-/* (1 - x / 8)^8, about exp(-x), of which an expf would take most of the time here. */
-static float falling(float x) {
-    const float t = x < 8 ? 1 - 0.125f * x : 0, square = t * t, fourth = square * square;
+/*
+ * The loops over a block vectorise, for which they choose between values and not what to compute.
+ *
+ * (1 - x / 8)^8, about exp(-x), of which an expf would take most of the time here.
+ */
+static inline float falling(float x) {
+    const float t = greater(1 - 0.125f * x, 0), square = t * t, fourth = square * square;
     return fourth * fourth;
 }
 
-/* The texel that is smoothed, as its neighbours are held against it. */
-typedef struct middle {
-    const double *position;
-    vec3 normal;
-    float luminance, variance;
-} middle;
-
-/* How far two receivers are samples of one smooth surface: 0 across creases, steps and charts. */
-static float geometric_weight(const smooth_job *job, const middle *at, size_t other, float reach_squared) {
-    const double *p = at->position, *q = job->receivers->positions + 3 * other;
-    const vec3 apart = {(float)(q[0] - p[0]), (float)(q[1] - p[1]), (float)(q[2] - p[2])};
-    const float cosine = vec3_dot(at->normal, vec3_from(job->receivers->normals + 3 * other));
-    /* a neighbour in the atlas that is further away in space than its texels are belongs to another chart */
-    if (cosine < 0.9f || vec3_dot(apart, apart) > 4 * reach_squared)
-        return 0;
-    const float height = vec3_dot(apart, at->normal);
-    const float square = cosine * cosine, fourth = square * square;
-    return fourth * fourth * falling(8 * height * height / reach_squared);
+/* How far texels and their neighbours are samples of one smooth surface: 0 across creases, steps and charts. */
+static void weigh_surface(size_t stride, const float *restrict at, const float *restrict other, float reach_squared,
+                          float *restrict out_weights) {
+    const float sharpness = 8 / reach_squared, farthest = 4 * reach_squared;
+    for (size_t i = 0; i < TEXEL_BLOCK; ++i) {
+        float apart[3], squared = 0, cosine = 0, height = 0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const size_t k = axis * stride + i, rest = X_REST * stride, normal = NX * stride;
+            apart[axis] = (other[k] - at[k]) + (other[k + rest] - at[k + rest]);
+            squared += apart[axis] * apart[axis];
+            cosine += at[k + normal] * other[k + normal];
+            height += apart[axis] * at[k + normal];
+        }
+        const float square = cosine * cosine, fourth = square * square;
+        const float weight = fourth * fourth * falling(height * height * sharpness);
+        /* a neighbour in the atlas that is further away in space than its texels are belongs to another chart */
+        const bool is_same_surface = (cosine >= 0.9f) & (squared <= farthest);
+        out_weights[i] = is_same_surface ? weight : 0;
+    }
 }
 
 /*
@@ -54,109 +51,176 @@ static const float noisier = 4;
 /* Less leaves mottles, more washes out what light does at contacts. */
 static const float tolerance = 7;
 
-static float value_weight(const smooth_job *job, const middle *at, size_t other) {
-    const float difference = at->luminance - luminance(job->values + CHANNELS * other);
-    const float va = at->variance, vb = job->variances[other];
-    const float noise = lesser(va, noisier * vb) + lesser(vb, noisier * va);
-    return noise > 0 ? falling(difference * difference / (tolerance * noise)) : (difference == 0 ? 1.0f : 0.0f);
+static void weigh_values(size_t stride, const float *restrict at, const float *restrict other,
+                         float *restrict io_weights) {
+    for (size_t i = 0; i < TEXEL_BLOCK; ++i) {
+        const float difference = at[LUMINANCE * stride + i] - other[LUMINANCE * stride + i];
+        const float va = at[VARIANCE * stride + i], vb = other[VARIANCE * stride + i];
+        const float noise = lesser(va, noisier * vb) + lesser(vb, noisier * va);
+        const float by_noise = falling(difference * difference / (tolerance * noise));
+        const float without_noise = difference == 0 ? 1.0f : 0.0f;
+        io_weights[i] *= noise > 0 ? by_noise : without_noise;
+    }
 }
 
-/* Of a tap that is not the middle itself. */
-static float tap_weight(const smooth_job *job, const middle *at, size_t other, int32_t dx, int32_t dy) {
-    const float reach = job->grid->spacing * (float)job->step;
-    const float reach_squared = reach * reach * (float)(dx * dx + dy * dy);
-    if (!(reach_squared > 0))
-        return 0;
-    const float weight = geometric_weight(job, at, other, reach_squared);
-    return weight > 0 && job->stops_on_value ? weight * value_weight(job, at, other) : weight;
+/* Squared distance of a neighbour so many steps away, were the surface flat. */
+static float flat_distance(const texel_rows *rows, int32_t dx, int32_t dy) {
+    const float reach = rows->grid->spacing * (float)rows->step;
+    return reach * reach * (float)(dx * dx + dy * dy);
 }
 
-static void smooth_texel(const smooth_job *job, int32_t row, int32_t column, size_t receiver, float *out_values,
-                         float *out_variances) {
-    const pl_texel_grid *grid = job->grid;
-    const middle at = {job->receivers->positions + 3 * receiver, vec3_from(job->receivers->normals + 3 * receiver),
-                       luminance(job->values + CHANNELS * receiver), job->variances[receiver]};
-    float sums[CHANNELS] = {0}, weights = 0, variance = 0;
-    for (int32_t dy = -RADIUS; dy <= RADIUS; ++dy) {
-        const int32_t y = row + dy * job->step;
-        if (y < 0 || y >= grid->height)
-            continue;
-        for (int32_t dx = -RADIUS; dx <= RADIUS; ++dx) {
-            const int32_t x = column + dx * job->step;
-            if (x < 0 || x >= grid->width)
-                continue;
-            const int32_t other = grid->receivers[(size_t)y * (size_t)grid->width + (size_t)x];
-            if (other < 0)
-                continue;
-            const float tap = spline[dx < 0 ? -dx : dx] * spline[dy < 0 ? -dy : dy];
-            const float weight = dx || dy ? tap * tap_weight(job, &at, (size_t)other, dx, dy) : tap;
-            for (int k = 0; k < CHANNELS; ++k)
-                sums[k] += weight * job->values[CHANNELS * (size_t)other + (size_t)k];
-            variance += weight * weight * job->variances[other];
-            weights += weight;
+typedef struct mean {
+    float sums[CHANNELS][TEXEL_BLOCK], variances[TEXEL_BLOCK], weights[TEXEL_BLOCK];
+} mean;
+
+static void add(size_t stride, const float *restrict other, float tap, const float *restrict weights,
+                mean *restrict io_mean) {
+    for (size_t i = 0; i < TEXEL_BLOCK; ++i) {
+        const float weight = tap * weights[i];
+        for (size_t k = 0; k < CHANNELS; ++k)
+            io_mean->sums[k][i] += weight * other[(RED + k) * stride + i];
+        io_mean->variances[i] += weight * weight * other[VARIANCE * stride + i];
+        io_mean->weights[i] += weight;
+    }
+}
+
+/* Weighted means over the taps of a block of texels, the first of which is `at` in row `row`. */
+static void smooth_block(texel_rows *rows, bool stops_on_value, int32_t row, int32_t column, mean *out_mean) {
+    const float *at = texel_row(rows, row) + column;
+    *out_mean = (mean){0};
+    for (int32_t dy = -TEXEL_RADIUS; dy <= TEXEL_RADIUS; ++dy) {
+        const float *texels = texel_row(rows, row + dy * rows->step);
+        for (int32_t dx = -TEXEL_RADIUS; texels && dx <= TEXEL_RADIUS; ++dx) {
+            const float *other = texels + column + dx * rows->step, distance = flat_distance(rows, dx, dy);
+            float weights[TEXEL_BLOCK];
+            if (!dx && !dy) {
+                for (size_t i = 0; i < TEXEL_BLOCK; ++i)
+                    weights[i] = 1;
+            } else {
+                if (!(distance > 0))
+                    continue;
+                weigh_surface(rows->stride, at, other, distance, weights);
+                if (stops_on_value)
+                    weigh_values(rows->stride, at, other, weights);
+            }
+            add(rows->stride, other, spline[abs(dx)] * spline[abs(dy)], weights, out_mean);
         }
     }
-    for (int k = 0; k < CHANNELS; ++k)
-        out_values[CHANNELS * receiver + (size_t)k] = sums[k] / weights;
-    out_variances[receiver] = variance / (weights * weights);
 }
 
-void pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values, const float *variances,
-               int32_t step, int32_t stops_on_value, int32_t first_row, int32_t row_count, float *out_values,
-               float *out_variances) {
-    const smooth_job job = {grid, receivers, values, variances, step, stops_on_value != 0};
-    for (int32_t row = first_row; row < first_row + row_count; ++row) {
-        for (int32_t column = 0; column < grid->width; ++column) {
-            const int32_t receiver = grid->receivers[(size_t)row * (size_t)grid->width + (size_t)column];
-            if (receiver >= 0)
-                smooth_texel(&job, row, column, (size_t)receiver, out_values, out_variances);
+static void smooth_row(texel_rows *rows, bool stops_on_value, int32_t row, float *out_values, float *out_variances) {
+    const int32_t width = rows->grid->width;
+    const int32_t *receivers = rows->grid->receivers + (size_t)row * (size_t)width;
+    for (int32_t column = 0; column < width; column += TEXEL_BLOCK) {
+        mean found;
+        bool is_found = false;
+        for (int32_t i = 0; i < TEXEL_BLOCK && column + i < width; ++i) {
+            const int32_t receiver = receivers[column + i];
+            if (receiver < 0)
+                continue;
+            if (!is_found)
+                smooth_block(rows, stops_on_value, row, column, &found);
+            is_found = true;
+            const float weight = found.weights[i];
+            for (size_t k = 0; k < CHANNELS; ++k)
+                out_values[CHANNELS * (size_t)receiver + k] = found.sums[k][i] / weight;
+            out_variances[receiver] = found.variances[i] / (weight * weight);
         }
     }
+}
+
+pl_status pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
+                    const float *variances, int32_t step, int32_t stops_on_value, int32_t first_row, int32_t row_count,
+                    float *out_values, float *out_variances) {
+    texel_rows rows = {.grid = grid, .receivers = receivers, .values = values, .variances = variances, .step = step};
+    if (step < 1 || step > PL_WIDEST_STEP)
+        return PL_ERR_ARGUMENT;
+    if (!texel_rows_create(&rows))
+        return PL_ERR_MEMORY;
+    /* rows a step apart share what is held */
+    for (int32_t first = first_row; first < first_row + row_count && first < first_row + step; ++first)
+        for (int32_t row = first; row < first_row + row_count; row += step)
+            smooth_row(&rows, stops_on_value != 0, row, out_values, out_variances);
+    texel_rows_destroy(&rows);
+    return PL_OK;
 }
 
 enum { LEAST_NEIGHBOURS = 3 };          /* fewer do not tell what is usual */
 static const float most_deviations = 2; /* that noise explains */
 
-/* What a texel's value is to be multiplied with to lie among those of its neighbours. */
-static float clamping(const smooth_job *job, int32_t row, int32_t column, size_t receiver) {
-    const pl_texel_grid *grid = job->grid;
-    const middle at = {job->receivers->positions + 3 * receiver, vec3_from(job->receivers->normals + 3 * receiver),
-                       luminance(job->values + CHANNELS * receiver), job->variances[receiver]};
-    float darkest = INFINITY, brightest = 0;
-    int neighbours = 0;
+/* The luminances around texels of the same surface. */
+typedef struct neighbours {
+    float darkest[TEXEL_BLOCK], brightest[TEXEL_BLOCK], count[TEXEL_BLOCK];
+} neighbours;
+
+static void add_neighbours(size_t stride, const float *restrict other, const float *restrict weights,
+                           neighbours *restrict io_around) {
+    for (size_t i = 0; i < TEXEL_BLOCK; ++i) {
+        const float there = other[LUMINANCE * stride + i];
+        const float darker = lesser(there, io_around->darkest[i]), brighter = greater(there, io_around->brightest[i]);
+        io_around->darkest[i] = weights[i] > 0 ? darker : io_around->darkest[i];
+        io_around->brightest[i] = weights[i] > 0 ? brighter : io_around->brightest[i];
+        io_around->count[i] += weights[i] > 0 ? 1.0f : 0.0f;
+    }
+}
+
+static void look_around(texel_rows *rows, int32_t row, int32_t column, neighbours *out_around) {
+    const float *at = texel_row(rows, row) + column;
+    for (size_t i = 0; i < TEXEL_BLOCK; ++i) {
+        out_around->darkest[i] = INFINITY;
+        out_around->brightest[i] = out_around->count[i] = 0;
+    }
     for (int32_t dy = -1; dy <= 1; ++dy) {
-        for (int32_t dx = -1; dx <= 1; ++dx) {
-            const int32_t y = row + dy, x = column + dx;
-            if ((!dx && !dy) || y < 0 || y >= grid->height || x < 0 || x >= grid->width)
+        const float *texels = texel_row(rows, row + dy);
+        for (int32_t dx = -1; texels && dx <= 1; ++dx) {
+            const float distance = flat_distance(rows, dx, dy);
+            float weights[TEXEL_BLOCK];
+            if (!(distance > 0))
                 continue;
-            const int32_t other = grid->receivers[(size_t)y * (size_t)grid->width + (size_t)x];
-            if (other < 0 || !(tap_weight(job, &at, (size_t)other, dx, dy) > 0))
-                continue;
-            const float there = luminance(job->values + CHANNELS * (size_t)other);
-            darkest = lesser(darkest, there);
-            brightest = greater(brightest, there);
-            ++neighbours;
+            weigh_surface(rows->stride, at, texels + column + dx, distance, weights);
+            add_neighbours(rows->stride, texels + column + dx, weights, out_around);
         }
     }
-    if (neighbours < LEAST_NEIGHBOURS || !(at.luminance > 0))
+}
+
+/* What the i-th texel's value is to be multiplied with to lie among those around it. */
+static float clamping(const neighbours *around, int32_t i, float light, float variance) {
+    if (around->count[i] < LEAST_NEIGHBOURS || !(light > 0))
         return 1;
-    const float most = most_deviations * sqrtf(at.variance);
-    const float wanted = lesser(greater(at.luminance, darkest), brightest);
-    const float factor = lesser(greater(wanted, at.luminance - most), at.luminance + most) / at.luminance;
+    const float most = most_deviations * sqrtf(variance);
+    const float wanted = lesser(greater(light, around->darkest[i]), around->brightest[i]);
+    const float factor = lesser(greater(wanted, light - most), light + most) / light;
     return factor < INFINITY ? factor : 1;
 }
 
-void pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
-                       const float *variances, int32_t first_row, int32_t row_count, float *out_values) {
-    const smooth_job job = {grid, receivers, values, variances, 1, false};
-    for (int32_t row = first_row; row < first_row + row_count; ++row) {
-        for (int32_t column = 0; column < grid->width; ++column) {
-            const int32_t receiver = grid->receivers[(size_t)row * (size_t)grid->width + (size_t)column];
+static void clamp_row(texel_rows *rows, int32_t row, float *out_values) {
+    const int32_t width = rows->grid->width;
+    const int32_t *receivers = rows->grid->receivers + (size_t)row * (size_t)width;
+    for (int32_t column = 0; column < width; column += TEXEL_BLOCK) {
+        neighbours around;
+        bool is_found = false;
+        for (int32_t i = 0; i < TEXEL_BLOCK && column + i < width; ++i) {
+            const int32_t receiver = receivers[column + i];
             if (receiver < 0)
                 continue;
-            const float factor = clamping(&job, row, column, (size_t)receiver);
-            for (size_t k = CHANNELS * (size_t)receiver; k < CHANNELS * ((size_t)receiver + 1); ++k)
-                out_values[k] = factor * values[k];
+            if (!is_found)
+                look_around(rows, row, column, &around);
+            is_found = true;
+            const float *value = rows->values + CHANNELS * (size_t)receiver;
+            const float factor = clamping(&around, i, luminance(value), rows->variances[receiver]);
+            for (size_t k = 0; k < CHANNELS; ++k)
+                out_values[CHANNELS * (size_t)receiver + k] = factor * value[k];
         }
     }
+}
+
+pl_status pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *receivers, const float *values,
+                            const float *variances, int32_t first_row, int32_t row_count, float *out_values) {
+    texel_rows rows = {.grid = grid, .receivers = receivers, .values = values, .variances = variances, .step = 1};
+    if (!texel_rows_create(&rows))
+        return PL_ERR_MEMORY;
+    for (int32_t row = first_row; row < first_row + row_count; ++row)
+        clamp_row(&rows, row, out_values);
+    texel_rows_destroy(&rows);
+    return PL_OK;
 }
