@@ -14,7 +14,30 @@
 #include <stdlib.h>
 
 enum { REPLICATES = 2 };
-enum { FEW = 8 }; /* samples of a replicate: as many tell whether a lamp is all seen or all hidden */
+enum { SURELY_WEAK = 8 }; /* times less than a strong light, a guess need not be mended */
+enum { FEW = 8 };         /* samples of a replicate: as many tell whether a lamp is all seen or all hidden */
+
+/* Lights that share rays, and the running sums of their importances. */
+typedef struct weak_lights {
+    size_t *lights, count;
+    float *sums, total;
+} weak_lights;
+
+static void add_weak_light(weak_lights *io_weak, size_t light, float importance) {
+    io_weak->total += importance;
+    io_weak->sums[io_weak->count] = io_weak->total;
+    io_weak->lights[io_weak->count++] = light;
+}
+
+/* The light at which the running sum passes `choice`; the last one where rounding has it that none does. */
+static size_t weak_light_at(const weak_lights *weak, float choice) {
+    size_t low = 0;
+    for (size_t left = weak->count, half; left > 1; left -= half) {
+        half = left / 2;
+        low += half * (size_t)(weak->sums[low + half - 1] <= choice);
+    }
+    return weak->lights[low];
+}
 
 typedef struct direct_job {
     const pl_scene *scene;
@@ -23,6 +46,7 @@ typedef struct direct_job {
     bool is_first;
     pl_light_balls balls;
     float *importances; /* one per light, of the receiver at hand */
+    weak_lights weak;   /* of it, too */
     uint64_t rays;
 } direct_job;
 
@@ -45,7 +69,7 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
                      vec3 origin, vec3 normal, uint32_t seed, float out_rgb[3]) {
     pl_light_sample sample;
     out_rgb[0] = out_rgb[1] = out_rgb[2] = 0;
-    const float total = light_importances(lights, balls, origin, normal, false, importances);
+    const float total = light_importances(lights, balls, origin, normal, INFINITY, importances);
     if (total <= 0)
         return false;
     const size_t chosen = choose_light(importances, lights->count, total, sobol(0, 2, seed));
@@ -170,25 +194,18 @@ static void add_strong_light(direct_job *job, const pl_receiver_frame *frame, si
 }
 
 /* All lights too weak for rays of their own: `samples` of them, in proportion to what they would give. */
-static void add_weak_lights(direct_job *job, const pl_receiver_frame *frame, float threshold, float total,
-                            uint32_t samples, uint32_t seed, float out_rgb[3]) {
-    const float step = total / (float)samples;
-    float next = step * sobol(0, 0, seed), passed = 0;
-    uint32_t k = 0;
-    for (size_t light = 0; light < job->lights->count && k < samples; ++light) {
-        const float importance = job->importances[light];
-        if (importance <= 0 || importance >= threshold)
+static void add_weak_lights(direct_job *job, const pl_receiver_frame *frame, const weak_lights *weak, uint32_t samples,
+                            uint32_t seed, float out_rgb[3]) {
+    const float step = weak->total / (float)samples, start = sobol(0, 0, seed);
+    for (uint32_t k = 0; k < samples; ++k) {
+        const size_t light = weak_light_at(weak, step * ((float)k + start));
+        pl_light_sample sample;
+        if (!light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 1, seed), sobol(k, 2, seed),
+                          &sample) ||
+            !shine(job, frame, &sample))
             continue;
-        passed += importance;
-        for (; next < passed && k < samples; next += step, ++k) {
-            pl_light_sample sample;
-            if (!light_sample(job->lights, light, frame->origin, frame->shading, sobol(k, 1, seed), sobol(k, 2, seed),
-                              &sample) ||
-                !shine(job, frame, &sample))
-                continue;
-            for (int c = 0; c < 3; ++c)
-                out_rgb[c] += bounded(sample.irradiance[c] * (step / importance));
-        }
+        for (int c = 0; c < 3; ++c)
+            out_rgb[c] += bounded(sample.irradiance[c] * (step / job->importances[light]));
     }
 }
 
@@ -200,29 +217,48 @@ static uint32_t share_of(uint32_t samples, float part, float total) {
 static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint32_t seed, float out_rgb[3],
                            float *out_variance) {
     float totals[REPLICATES][3] = {{0}};
-    const float total =
-        light_importances(job->lights, &job->balls, frame->origin, frame->shading, true, job->importances);
-    const float threshold = total / (2 * (float)job->samples);
-    float weak = 0;
-
-    if (total > 0) {
-        for (size_t light = 0; light < job->lights->count; ++light) {
-            const float importance = job->importances[light];
-            if (importance >= threshold)
-                add_strong_light(job, frame, light, share_of(job->samples, importance, total),
-                                 hash_pair(seed, (uint32_t)light), totals);
-            else
-                weak += importance;
-        }
-        const uint32_t each = share_of(job->samples, weak, total) / REPLICATES + 1;
-        for (uint32_t r = 0; weak > 0 && r < REPLICATES; ++r)
-            add_weak_lights(job, frame, threshold, weak, each, hash_pair(seed, 0x80000000u + r), totals[r]);
+    const float strong = 1 / (2 * (float)job->samples); /* of all that there may be: a light with rays of its own */
+    const float total = light_importances(job->lights, &job->balls, frame->origin, frame->shading, strong / SURELY_WEAK,
+                                          job->importances);
+    job->weak.count = 0;
+    job->weak.total = 0;
+    for (size_t light = 0; light < job->lights->count; ++light) {
+        const float importance = job->importances[light];
+        if (importance > 0 && importance >= strong * total)
+            add_strong_light(job, frame, light, share_of(job->samples, importance, total),
+                             hash_pair(seed, (uint32_t)light), totals);
+        else if (importance > 0)
+            add_weak_light(&job->weak, light, importance);
+    }
+    if (job->weak.count) {
+        const uint32_t each = share_of(job->samples, job->weak.total, total) / REPLICATES + 1;
+        for (uint32_t r = 0; r < REPLICATES; ++r)
+            add_weak_lights(job, frame, &job->weak, each, hash_pair(seed, 0x80000000u + r), totals[r]);
     }
     for (int c = 0; c < 3; ++c)
         out_rgb[c] = bounded(0.5f * (totals[0][c] + totals[1][c]));
     /* of a mean of two */
     const float difference = luminance(totals[0]) - luminance(totals[1]);
     *out_variance = lesser(0.25f * difference * difference, most_light * most_light);
+}
+
+static void end(direct_job *job) {
+    light_balls_destroy(&job->balls);
+    free(job->importances);
+    free(job->weak.lights);
+    free(job->weak.sums);
+}
+
+/* Room for what is found for a receiver; false where there is no memory. */
+static bool begin(direct_job *job) {
+    const size_t room = job->lights->count + 1;
+    job->importances = malloc(sizeof(float) * room);
+    job->weak.lights = malloc(sizeof(size_t) * room);
+    job->weak.sums = malloc(sizeof(float) * room);
+    if (light_balls_create(job->lights, &job->balls) && job->importances && job->weak.lights && job->weak.sums)
+        return true;
+    end(job);
+    return false;
 }
 
 pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_receivers *receivers, size_t first,
@@ -235,17 +271,13 @@ pl_status pl_direct(const pl_scene *scene, const pl_lights *lights, const pl_rec
         return PL_ERR_ARGUMENT;
     direct_job job = {
         .scene = scene, .lights = lights, .samples = samples ? samples : 1, .is_first = is_first != 0, .seed = seed};
-    job.importances = malloc(sizeof(float) * (lights->count + 1));
-    if (!job.importances || !light_balls_create(lights, &job.balls)) {
-        free(job.importances);
+    if (!begin(&job))
         return PL_ERR_MEMORY;
-    }
     for (size_t i = first; i < first + count; ++i) {
         const pl_receiver_frame frame = receiver_frame(scene, receivers, i);
         light_receiver(&job, &frame, hash_pair(seed, (uint32_t)i), out_irradiance + 3 * i, out_variance + i);
     }
     *out_rays = job.rays;
-    light_balls_destroy(&job.balls);
-    free(job.importances);
+    end(&job);
     return PL_OK;
 }

@@ -68,7 +68,7 @@ static void ball_importances(const pl_light_balls *balls, vec3 point, vec3 norma
         const float height = x * normal.x + y * normal.y + z * normal.z + radii[i];
         const float best = height < distance ? height : distance;
         const float nearest = square > radii[i] * radii[i] ? square : radii[i] * radii[i];
-        const float light = best > 0 ? strengths[i] * (best / distance / nearest) : 0;
+        const float light = best > 0 ? strengths[i] * (best / (distance * nearest)) : 0;
         out[i] = light < most_light ? light : most_light;
     }
 }
@@ -94,16 +94,25 @@ static float special_importance(const pl_lights *lights, size_t light, vec3 poin
     }
 }
 
-float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal, bool closely,
-                        float *out_importances) {
-    float total = 0;
+/* The sum of all, in four parts at a time: each addition waits for the one before it. */
+static float sum_of(const float *numbers, size_t count) {
+    float parts[4] = {0, 0, 0, 0};
+    for (size_t k = 0; k + 4 <= count; k += 4)
+        for (size_t part = 0; part < 4; ++part)
+            parts[part] += numbers[k + part];
+    for (size_t k = count & ~(size_t)3; k < count; ++k)
+        parts[0] += numbers[k];
+    return (parts[0] + parts[1]) + (parts[2] + parts[3]);
+}
+
+float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal,
+                        float worth_a_look, float *out_importances) {
     ball_importances(balls, point, normal, out_importances);
+    const float least = worth_a_look * sum_of(out_importances, balls->count);
     for (size_t k = 0; k < balls->special_count; ++k) {
         const size_t light = balls->special[k];
-        out_importances[light] =
-            bounded(special_importance(lights, light, point, normal, out_importances[light], closely));
+        const float ball = out_importances[light];
+        out_importances[light] = bounded(special_importance(lights, light, point, normal, ball, ball >= least));
     }
-    for (size_t light = 0; light < balls->count; ++light)
-        total += out_importances[light];
-    return total;
+    return sum_of(out_importances, balls->count);
 }

@@ -43,11 +43,11 @@ bool light_balls_create(const pl_lights *lights, pl_light_balls *out_balls);
 void light_balls_destroy(pl_light_balls *balls);
 
 /*
- * What each light gives unoccluded, as luminance of irradiance: exact where it is near and has a closed form,
- * else, or where not asked for `closely`, a guess that is above 0 wherever a sample can be. Returns their sum.
+ * What each light gives unoccluded, as luminance of irradiance: a guess that is above 0 wherever a sample can be; of
+ * those that seem to give `worth_a_look` of it all, or more, exact where near and in closed form. Returns their sum.
  */
-float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal, bool closely,
-                        float *out_importances);
+float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal,
+                        float worth_a_look, float *out_importances);
 
 /* A point of the light for (x, y) of the unit square; false where it cannot light the receiver. */
 bool light_sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float x, float y,
