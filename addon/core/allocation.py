@@ -66,6 +66,6 @@ def next_pass(due, taken, most, cost, rays_left):
         powers = np.round(np.log2(np.maximum(wanted, 1)))
         further = 2 ** np.minimum(powers, highest).astype(np.int32)
         active = np.flatnonzero(wanted >= np.maximum((WORTH - 1) * taken, 1))
-        if cost * further[active].sum() <= rays_left or not len(active):
+        if cost * further[active].sum(dtype=np.int64) <= rays_left or not len(active):
             return active, further
         due = LESS * due

@@ -52,6 +52,7 @@ def mixed(first, second, chosen, probes: Measured):
     group = np.searchsorted(bounds, np.abs(apart)).astype(np.int8)
     # one wrong point counts as one, however wrong
     wanted = np.clip((probes.luminance - luminance_of(first[chosen])) / scale[chosen], -1, 1)
-    along = np.bincount(group[chosen], wanted * apart[chosen], count)
-    shares = np.clip(along / np.maximum(np.bincount(group[chosen], apart[chosen] ** 2, count), 1e-30), 0, 1)
+    moved = apart[chosen].astype(np.float64)
+    along = np.bincount(group[chosen], wanted * moved, count)
+    shares = np.clip(along / np.maximum(np.bincount(group[chosen], moved**2, count), 1e-30), 0, 1)
     return first + shares.astype(np.float32)[group, None] * (second - first)

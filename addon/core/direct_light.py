@@ -74,7 +74,7 @@ def refined_direct(
         if not wanted.any():
             break
         # half of what is left of the bar for each pass
-        begin, width = 1 - 0.5 ** (attempt - 1), 0.5**attempt / max(wanted.sum(), 1)
+        begin, width = 1 - 0.5 ** (attempt - 1), 0.5**attempt / max(wanted.sum(dtype=np.int64), 1)
         for count in np.unique(wanted[wanted > 0]):
             chosen = np.flatnonzero(wanted == count)
             share = width * count * len(chosen)

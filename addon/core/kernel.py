@@ -217,7 +217,7 @@ def smooth(workers, grid, receivers, values, variances, step, stops_on_value):
             stop - start, out_values, out_variances,
         )  # fmt: skip
 
-    workers.each_range(height, ROWS * step, call)
+    workers.each_range(height, max(ROWS, ROWS * step // 2), call)
     return out_values, out_variances
 
 

@@ -82,7 +82,7 @@ class _Samples:
     @property
     def cost(self) -> float:
         """Rays traced for one of all replicates: with those that it goes on as."""
-        return self.rays / int(self.taken.sum())
+        return self.rays / int(self.taken.sum(dtype=np.int64))
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +204,7 @@ def _best_estimate(job: GatherJob, grid, samples: _Samples, scales, direct, prob
         smooth = found_by(*smoothed(workers, grid, receivers, samples.light, variance, scales, taken))
         if smooth.rms < as_it_is:
             return smooth
-    return found_by(samples.light, pooled(workers, None, receivers, variance * taken) / taken)
+    return found_by(samples.light, pooled(workers, None, receivers, variance * taken.astype(np.float32)) / taken)
 
 
 def _denoised(denoise, grid, found: _Found, samples: _Samples, direct, probes: Probes) -> _Found:
@@ -225,7 +225,7 @@ def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, direct_rm
         return np.where(found.noise > SPECKLE * error, np.float32(np.inf), np.float32(0))
     errors = measured_errors(found.noise, probes.receivers, found.squares)
     errors, aimed_at = _gathered_part(errors, found.rms, aim * error, direct_rms)
-    return rays_due(errors, samples.taken, aimed_at).astype(np.float32)
+    return np.minimum(rays_due(errors, samples.taken, aimed_at), MOST_RAYS).astype(np.float32)
 
 
 def _gathered_part(errors, rms, target, direct_rms):

@@ -54,7 +54,7 @@ class Measured:
         """Squared relative errors (M,) of irradiance (M, 3), without what the probes are uncertain by themselves."""
         # one wrong point counts as one, however wrong
         squares = np.minimum(((values @ LUMINANCE - self.luminance) / scale) ** 2, 1.0)
-        return squares - np.minimum(self.variance / scale**2, 1.0)
+        return squares - np.minimum(np.sqrt(self.variance) / scale, 1.0) ** 2
 
 
 @dataclass(frozen=True, slots=True)

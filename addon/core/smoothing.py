@@ -120,7 +120,7 @@ def restoring(grid: TexelGrid, before, luminance, deviations):
 def _around(grid: TexelGrid, luminance):
     """Sums float32 (N,) of luminance (N,) over the square of texels around each receiver, KEPT to every side."""
     sums, height = np.zeros(len(luminance), np.float32), len(grid.receivers)
-    for top in range(0, height, BAND):
+    for top in range(0, height if len(sums) else 0, BAND):
         band = slice(top, min(top + BAND, height))
         above, below = min(KEPT, top), min(KEPT, height - band.stop)
         cells = grid.receivers[top - above : band.stop + below]

@@ -39,7 +39,10 @@ class TexelLight:
     def show(self, radiosity) -> None:
         """From now on rays see the reflected radiosity float32 (N, 3) of the receivers [W/m^2]."""
         # in place: to all that look, the light last shown is the one that counts, and two images would take the room
-        np.take(np.append(packed(radiosity), NO_LIGHT), self.receivers, out=self.light, mode="wrap")
+        of_all = np.append(packed(radiosity), NO_LIGHT)
+        for top in range(0, len(self.light), BAND):
+            band = slice(top, top + BAND)
+            self.light[band] = of_all[self.receivers[band]]
         self.light[self.is_split] |= SPLIT
 
     def looking_further(self, factor: float) -> TexelLight:

@@ -6,7 +6,10 @@ import numpy as np
 
 
 def z_order(*axes):
-    """Place on the curve of points whose whole coordinates are ``axes``, each (N,): uint64 (N,) (Morton 1966)."""
+    """Place on the curve of points with whole coordinates ``axes`` from 0 on, each (N,): uint64 (N,) (Morton 1966).
+
+    Tables of as many numbers as the largest coordinate are made for it.
+    """
     places = np.zeros(len(axes[0]), np.uint64)
     for k, axis in enumerate(axes):
         places |= _spread(int(axis.max(initial=0)) + 1, len(axes), k)[axis]

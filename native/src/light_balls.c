@@ -55,6 +55,7 @@ bool light_balls_create(const pl_lights *lights, pl_light_balls *out_balls) {
 void light_balls_destroy(pl_light_balls *balls) {
     free(balls->x);
     free(balls->special);
+    *balls = (pl_light_balls){0};
 }
 
 /* Strength by the square law, with the best cosine that any part of the ball can have. */

@@ -44,7 +44,8 @@ void light_balls_destroy(pl_light_balls *balls);
 
 /*
  * What each light gives unoccluded, as luminance of irradiance: a guess that is above 0 wherever a sample can be; of
- * those that seem to give `worth_a_look` of it all, or more, exact where near and in closed form. Returns their sum.
+ * those that seem to give `worth_a_look` of it all, or more, exact where near and in closed form. What seems so is a
+ * guess, too, which hangs on lamps that face away. Returns their sum.
  */
 float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal,
                         float worth_a_look, float *out_importances);

@@ -18,8 +18,8 @@ light_face mesh_face(const pl_lights *lights, size_t triangle, vec3 point) {
 }
 
 /*
- * The luminance that arrives of a face, as if all of it came from its middle: a tenth of what Lambert's formula takes,
- * and near enough to choose by. Below 0 where the face is so near or so low that it is not.
+ * The luminance that arrives of a face, as if all of it came from its middle: near enough to choose by, in a tenth
+ * of the time that Lambert's formula takes. Below 0 where the face is so near or so low that it is not.
  */
 static float from_middle(const light_face *face, vec3 point, vec3 normal) {
     const vec3 a = face->corners[0], ab = vec3_sub(face->corners[1], a), ac = vec3_sub(face->corners[2], a);

@@ -4,11 +4,12 @@ Under `make sanitize` the kernel watches its own memory while these run.
 """
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from addon.core import _kernel
-from addon.core.emitters import LIGHT_FLOATS
+from addon.core.emitters import LIGHT_FLOATS, LUMINANCE
 from addon.core.kernel import embree
 from addon.core.texel_light import packed
 from tests.random_scenes import placed_meshes
@@ -261,6 +262,8 @@ def test_gathered_light_of_any_solution(data):
     except REFUSALS:
         return
     assert all(np.isfinite(part).all() and (part >= 0).all() for part in sums)
+    # the same light in two ways, 16 rays of float32 each
+    assert sums[1].sum(axis=1) == pytest.approx(sums[0] @ LUMINANCE, rel=1e-4)
 
 
 @given(st.data())
@@ -309,7 +312,8 @@ def test_smoothing_of_any_grid(data):
     variances = arrays(data.draw, many, np.float32, st.sampled_from((0.0, 1.0, 1e34)))
     out, out_variances = np.zeros((many, 3), np.float32), np.zeros(many, np.float32)
     first, rows = data.draw(numbers), data.draw(numbers)
-    step, spacing = data.draw(st.sampled_from((1, 8))), data.draw(st.sampled_from((0.0, 1e-30, 1.0)))
+    step = data.draw(st.sampled_from((1, 8, 3, 0, -1, 1 << 20, 1 << 21)))
+    spacing = data.draw(st.sampled_from((0.0, 1e-30, 1.0)))
     try:
         _kernel.smooth(grid, width, height, spacing, where, values, variances, step, 1, first, rows, out, out_variances)
         clamped = np.zeros_like(out)

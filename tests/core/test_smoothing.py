@@ -8,7 +8,7 @@ from addon.core.gather_sums import GatherSums
 from addon.core.kernel import clamp_outliers, smooth
 from addon.core.receivers import Receivers
 from addon.core.relative import scale_of
-from addon.core.smoothing import MOST_KEPT, TexelGrid, blurred, restoring, smoothed
+from addon.core.smoothing import BAND, KEPT, MOST_KEPT, TexelGrid, _around, blurred, restoring, smoothed
 from addon.core.workers import Workers
 from tests.reference import smoothing as reference
 
@@ -16,27 +16,28 @@ SIDE = 40
 SPACING = 0.01
 
 
-def wall(side=SIDE, heights=None, normals=None):
-    """A square of texels on z = 0, with where they are."""
-    grid = np.arange(side * side, dtype=np.int32).reshape(side, side)
-    y, x = np.divmod(np.arange(side * side), side)
-    z = np.zeros(side * side) if heights is None else heights
-    facing = np.tile(np.float32([0, 0, 1]), (side * side, 1)) if normals is None else normals
-    receivers = Receivers(SPACING * np.stack([x, y, z / SPACING], 1), facing, np.zeros(side * side, np.int32))
+def wall(side=SIDE, heights=None, normals=None, rows=None):
+    """A square of texels on z = 0, or so many rows of them, with where they are."""
+    count = side * (rows or side)
+    grid = np.arange(count, dtype=np.int32).reshape(-1, side)
+    y, x = np.divmod(np.arange(count), side)
+    z = np.zeros(count) if heights is None else heights
+    facing = np.tile(np.float32([0, 0, 1]), (count, 1)) if normals is None else normals
+    receivers = Receivers(SPACING * np.stack([x, y, z / SPACING], 1), facing, np.zeros(count, np.int32))
     nowhere = np.full((1, 3, 2), np.nan, np.float32)
-    ones = np.ones((side * side, 3), np.float32)
+    ones = np.ones((count, 3), np.float32)
     return TexelGrid(grid, SPACING, nowhere, ones, ones[:, 0]), receivers
 
 
-def rough_wall(seed, most_variance, holes, side=12):
+def rough_wall(seed, most_variance, holes, side=12, rows=12):
     """A wall that is not even, with a share of holes; values (N, 3) and variances (N,) of its texels."""
-    rng = np.random.default_rng(seed)
-    normals = np.float32([0, 0, 1]) + 0.3 * rng.standard_normal((side * side, 3)).astype(np.float32)
+    rng, count = np.random.default_rng(seed), side * rows
+    normals = np.float32([0, 0, 1]) + 0.3 * rng.standard_normal((count, 3)).astype(np.float32)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    grid, receivers = wall(side, 0.003 * rng.standard_normal(side * side), normals)
-    grid.receivers[rng.random((side, side)) < holes] = -1
-    values = rng.random((side * side, 3)).astype(np.float32)
-    return grid, receivers, values, (most_variance * rng.random(side * side)).astype(np.float32)
+    grid, receivers = wall(side, 0.003 * rng.standard_normal(count), normals, rows)
+    grid.receivers[rng.random((rows, side)) < holes] = -1
+    values = rng.random((count, 3)).astype(np.float32)
+    return grid, receivers, values, (most_variance * rng.random(count)).astype(np.float32)
 
 
 def noisy(light, deviation, seed=1):
@@ -55,10 +56,14 @@ def run(grid, receivers, means, taken=1):
         return smoothed(workers, grid, receivers, values, variances, near, taken)
 
 
-@pytest.mark.parametrize("step", [1, 4])
+# the kernel takes 64 texels of a row at once, and ranges of 16 rows or more: one less, one more, several of each, and a
+# last range that is no whole number of steps
+@pytest.mark.parametrize(
+    ("step", "side", "rows"), [(1, 12, 12), (4, 12, 12), (1, 130, 21), (2, 63, 21), (4, 65, 45), (8, 1, 5), (3, 64, 29)]
+)
 @pytest.mark.parametrize("stops_on_value", [False, True], ids=["geometry", "value"])
-def test_a_level_is_what_its_definition_says(step, stops_on_value):
-    grid, receivers, values, variances = rough_wall(3, 0.05, 0.2)
+def test_a_level_is_what_its_definition_says(step, side, rows, stops_on_value):
+    grid, receivers, values, variances = rough_wall(3, 0.05, 0.2, side, rows)
     with Workers(2) as workers:
         found = smooth(workers, grid, receivers, values, variances, step, stops_on_value)
     where = grid.receivers, SPACING, receivers.positions, receivers.normals.astype(float)
@@ -68,8 +73,9 @@ def test_a_level_is_what_its_definition_says(step, stops_on_value):
     assert found[1] == pytest.approx(exact[1], abs=3e-6)
 
 
-def test_outliers_are_clamped_as_the_definition_says():
-    grid, receivers, values, variances = rough_wall(6, 0.02, 0.4)
+@pytest.mark.parametrize(("side", "rows"), [(12, 12), (66, 18)])
+def test_outliers_are_clamped_as_the_definition_says(side, rows):
+    grid, receivers, values, variances = rough_wall(6, 0.02, 0.4, side, rows)
     with Workers(2) as workers:
         found = clamp_outliers(workers, grid, receivers, values, variances)
     where = grid.receivers, SPACING, receivers.positions, receivers.normals.astype(float)
@@ -136,7 +142,7 @@ def test_smoothing_keeps_the_light_that_few_rays_found():
 
 
 @pytest.mark.parametrize(("bright", "dim"), [(1e6, 1e-12), (1e17, 1e-32)])
-def test_what_is_kept_leaves_the_dark_dark(bright, dim):
+def test_what_is_restored_leaves_the_dark_dark(bright, dim):
     """Sums beside what is bright are rounded by more than the dim there is: that is changed by half at the most."""
     side = 64
     grid, _ = wall(side)
@@ -149,6 +155,20 @@ def test_what_is_kept_leaves_the_dark_dark(bright, dim):
         # pooled, so that the dark has the noise of what is bright
         ratios = restoring(grid, before, luminance, np.full(side * side, np.sqrt(bright), np.float32))
     assert (abs(ratios - 1) <= MOST_KEPT + 1e-6).all()
+
+
+def test_what_is_around_a_texel_is_the_square_it_stands_in():
+    """Over more rows than are summed at once."""
+    grid, _ = wall(50, rows=2 * BAND + 9)
+    rng = np.random.default_rng(8)
+    grid.receivers[rng.random(grid.receivers.shape) < 0.3] = -1
+    light = rng.random(grid.receivers.size).astype(np.float32)
+    image = np.where(grid.receivers >= 0, light.reshape(grid.receivers.shape), 0.0)
+    found = _around(grid, light)
+    for row, column in zip(*np.nonzero(grid.receivers >= 0)):
+        square = image[max(row - KEPT, 0) : row + KEPT + 1, max(column - KEPT, 0) : column + KEPT + 1]
+        # differences of float64 sums over all rows, rounded once
+        assert found[grid.receivers[row, column]] == pytest.approx(square.sum(), rel=1e-6)
 
 
 def test_noise_falls_by_what_so_many_texels_are_worth():

@@ -71,6 +71,19 @@ def gathered_in_a_box(light, is_split):
     return sums.means(count)
 
 
+def test_what_was_shown_before_is_forgotten():
+    cells = np.arange(600, dtype=np.int32).reshape(300, 2)[::-1] - 1  # the last has no receiver
+    is_split = cells % 3 == 0
+    shown, light = texel_light(np.zeros((0, 3, 2), np.float32), cells, is_split, 0.0), np.zeros((599, 3), np.float32)
+    shown.show(light + 7)
+    light[:] = np.arange(599)[:, None]
+    shown.show(light)
+    has_light = cells >= 0
+    assert (shown.light[~has_light] == NO_LIGHT).all()
+    assert (shown.light[has_light] >> np.uint64(63) == is_split[has_light]).all()
+    assert unpacked(shown.light)[has_light] == pytest.approx(light[cells[has_light]], rel=1e-4)  # 14 bits
+
+
 def test_rays_find_the_light_of_texels():
     light = (3.0, 0.7, 1e-6)
     found = gathered_in_a_box(light, is_split=False)

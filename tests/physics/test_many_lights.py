@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from addon.core.emitters import LUMINANCE
-from addon.core.scene import Material, PointLight
+from addon.core.scene import AreaLight, Material, PointLight
 from tests.physics.lighting import direct_light, random_points
 from tests.reference.polygon import point_to_polygon
-from tests.scenes import rectangle
+from tests.scenes import Part, rectangle
 
 COUNT = 200
 BOARD = rectangle((-0.6, -0.6, 0.8), (1.2, 0, 0), (0, 1.2, 0))
@@ -57,6 +57,26 @@ def test_one_strong_lamp_among_weak_ones_has_no_noise_of_its_own():
     weak = exact_sum(lights, points) @ LUMINANCE
     assert np.sqrt(np.mean(((values - exact) @ LUMINANCE) ** 2)) < weak.mean()
     assert np.sqrt(variance.mean()) < weak.mean()
+
+
+@pytest.mark.parametrize("samples", [4, 32])
+def test_forty_glowing_meshes_and_lamps_give_what_many_rays_say(samples):
+    """Near ones and far ones, that hide each other: what a light is taken for when rays are shared is not its light."""
+    rng, meshes = np.random.default_rng(3), []
+    for number in range(40):
+        centre = np.append(rng.uniform(-3, 3, 2), rng.uniform(0.3, 3))
+        glow = Material(f"glow {number}", (0, 0, 0), radiance=(rng.uniform(0.1, 5),) * 3)
+        corners = centre + rng.uniform(0.05, 0.4) * rng.standard_normal((4, 3))
+        meshes.append(Part(corners, [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)], glow))
+    panels = [
+        AreaLight(f"panel {k}", (x, 1.0, 2.9), (0.3, 0, 0), (0, 0.2, 0), (3.0, 3.0, 3.0)) for k, x in enumerate((-1, 1))
+    ]
+    points = random_points(60, rng)
+    many = direct_light(panels, points, meshes, samples=2048)[0].mean()
+    means = [direct_light(panels, points, meshes, samples, seed)[0].mean() for seed in range(40)]
+    # at 4 standard errors; 2048 rays of each point are good to a tenth of that
+    assert np.mean(means) == pytest.approx(many, abs=4.1 * np.std(means) / np.sqrt(40))
+    assert np.std(means) < 0.1 * many
 
 
 def test_a_wall_of_glowing_tiles_is_one_lamp():
