@@ -108,24 +108,38 @@ static void smooth_block(texel_rows *rows, bool stops_on_value, int32_t row, int
     }
 }
 
+/* Texels of the block that starts at a column, within the row. */
+static int32_t block_width(const pl_texel_grid *grid, int32_t column) {
+    const int32_t left = grid->width - column;
+    return left < TEXEL_BLOCK ? left : TEXEL_BLOCK;
+}
+
+static bool has_receiver(const int32_t *receivers, int32_t count) {
+    for (int32_t i = 0; i < count; ++i)
+        if (receivers[i] >= 0)
+            return true;
+    return false;
+}
+
+static void store_mean(const mean *found, size_t i, size_t receiver, float *out_values, float *out_variances) {
+    const float weight = found->weights[i];
+    for (size_t k = 0; k < CHANNELS; ++k)
+        out_values[CHANNELS * receiver + k] = found->sums[k][i] / weight;
+    out_variances[receiver] = found->variances[i] / (weight * weight);
+}
+
 static void smooth_row(texel_rows *rows, bool stops_on_value, int32_t row, float *out_values, float *out_variances) {
-    const int32_t width = rows->grid->width;
-    const int32_t *receivers = rows->grid->receivers + (size_t)row * (size_t)width;
-    for (int32_t column = 0; column < width; column += TEXEL_BLOCK) {
+    const pl_texel_grid *grid = rows->grid;
+    for (int32_t column = 0; column < grid->width; column += TEXEL_BLOCK) {
+        const int32_t *receivers = grid->receivers + (size_t)row * (size_t)grid->width + column;
+        const int32_t count = block_width(grid, column);
         mean found;
-        bool is_found = false;
-        for (int32_t i = 0; i < TEXEL_BLOCK && column + i < width; ++i) {
-            const int32_t receiver = receivers[column + i];
-            if (receiver < 0)
-                continue;
-            if (!is_found)
-                smooth_block(rows, stops_on_value, row, column, &found);
-            is_found = true;
-            const float weight = found.weights[i];
-            for (size_t k = 0; k < CHANNELS; ++k)
-                out_values[CHANNELS * (size_t)receiver + k] = found.sums[k][i] / weight;
-            out_variances[receiver] = found.variances[i] / (weight * weight);
-        }
+        if (!has_receiver(receivers, count))
+            continue;
+        smooth_block(rows, stops_on_value, row, column, &found);
+        for (int32_t i = 0; i < count; ++i)
+            if (receivers[i] >= 0)
+                store_mean(&found, (size_t)i, (size_t)receivers[i], out_values, out_variances);
     }
 }
 
@@ -183,8 +197,8 @@ static void look_around(texel_rows *rows, int32_t row, int32_t column, neighbour
     }
 }
 
-/* What the i-th texel's value is to be multiplied with to lie among those around it. */
-static float clamping(const neighbours *around, int32_t i, float light, float variance) {
+/* What the i-th texel's light is to be multiplied with to lie among those around it. */
+static float clamping(const neighbours *around, size_t i, float light, float variance) {
     if (around->count[i] < LEAST_NEIGHBOURS || !(light > 0))
         return 1;
     const float most = most_deviations * sqrtf(variance);
@@ -193,24 +207,24 @@ static float clamping(const neighbours *around, int32_t i, float light, float va
     return factor < INFINITY ? factor : 1;
 }
 
+static void store_clamped(const texel_rows *rows, const neighbours *around, size_t i, size_t receiver,
+                          float *out_values) {
+    const float *value = rows->values + CHANNELS * receiver;
+    const float factor = clamping(around, i, luminance(value), rows->variances[receiver]);
+    for (size_t k = 0; k < CHANNELS; ++k)
+        out_values[CHANNELS * receiver + k] = factor * value[k];
+}
+
 static void clamp_row(texel_rows *rows, int32_t row, float *out_values) {
-    const int32_t width = rows->grid->width;
-    const int32_t *receivers = rows->grid->receivers + (size_t)row * (size_t)width;
-    for (int32_t column = 0; column < width; column += TEXEL_BLOCK) {
-        neighbours around;
-        bool is_found = false;
-        for (int32_t i = 0; i < TEXEL_BLOCK && column + i < width; ++i) {
-            const int32_t receiver = receivers[column + i];
-            if (receiver < 0)
-                continue;
-            if (!is_found)
-                look_around(rows, row, column, &around);
-            is_found = true;
-            const float *value = rows->values + CHANNELS * (size_t)receiver;
-            const float factor = clamping(&around, i, luminance(value), rows->variances[receiver]);
-            for (size_t k = 0; k < CHANNELS; ++k)
-                out_values[CHANNELS * (size_t)receiver + k] = factor * value[k];
-        }
+    const pl_texel_grid *grid = rows->grid;
+    const int32_t *receivers = grid->receivers + (size_t)row * (size_t)grid->width;
+    neighbours around;
+    for (int32_t column = 0; column < grid->width; ++column) {
+        const int32_t i = column % TEXEL_BLOCK;
+        if (i == 0 && has_receiver(receivers + column, block_width(grid, column)))
+            look_around(rows, row, column, &around);
+        if (receivers[column] >= 0)
+            store_clamped(rows, &around, (size_t)i, (size_t)receivers[column], out_values);
     }
 }
 
