@@ -14,8 +14,8 @@
 #include <stdlib.h>
 
 enum { REPLICATES = 2 };
-enum { SURELY_WEAK = 8 }; /* times less than a strong light, a guess need not be mended */
-enum { FEW = 8 };         /* samples of a replicate: as many tell whether a lamp is all seen or all hidden */
+static const float surely_weak = 8; /* times less than a strong light, a guess need not be mended */
+enum { FEW = 8 };                   /* samples of a replicate: as many tell whether a lamp is all seen or all hidden */
 
 /* Lights that share rays, and the running sums of their importances. */
 typedef struct weak_lights {
@@ -218,7 +218,7 @@ static void light_receiver(direct_job *job, const pl_receiver_frame *frame, uint
                            float *out_variance) {
     float totals[REPLICATES][3] = {{0}};
     const float strong = 1 / (2 * (float)job->samples); /* of all that there may be: a light with rays of its own */
-    const float total = light_importances(job->lights, &job->balls, frame->origin, frame->shading, strong / SURELY_WEAK,
+    const float total = light_importances(job->lights, &job->balls, frame->origin, frame->shading, strong / surely_weak,
                                           job->importances);
     job->weak.count = 0;
     job->weak.total = 0;

@@ -159,8 +159,8 @@ pl_status pl_smooth(const pl_texel_grid *grid, const pl_receivers *receivers, co
     return PL_OK;
 }
 
-enum { LEAST_NEIGHBOURS = 3 };          /* fewer do not tell what is usual */
-static const float most_deviations = 2; /* that noise explains */
+static const float least_neighbours = 3; /* fewer do not tell what is usual */
+static const float most_deviations = 2;  /* that noise explains */
 
 /* The luminances around texels of the same surface. */
 typedef struct neighbours {
@@ -199,7 +199,7 @@ static void look_around(texel_rows *rows, int32_t row, int32_t column, neighbour
 
 /* What the i-th texel's light is to be multiplied with to lie among those around it. */
 static float clamping(const neighbours *around, size_t i, float light, float variance) {
-    if (around->count[i] < LEAST_NEIGHBOURS || !(light > 0))
+    if (around->count[i] < least_neighbours || !(light > 0))
         return 1;
     const float most = most_deviations * sqrtf(variance);
     const float wanted = lesser(greater(light, around->darkest[i]), around->brightest[i]);
