@@ -187,7 +187,7 @@ def _show_what_was_gathered(job: GatherJob, grid, samples: _Samples, direct):
 
 
 def _best_estimate(job: GatherJob, grid, samples: _Samples, scales, direct, probes: Probes) -> _Found:
-    """What gathered light comes to, with what it is relative to (N,).
+    """What gathered light comes to; ``scales`` (N,): what errors of it are relative to.
 
     Smoothed, or as it is where that turns out better: a lightmap of few texels has little that is smooth.
     """

@@ -3,6 +3,8 @@
  *
  * One level of an a-trous wavelet filter with edge stops (Dammertz, Sewtz, Hanika & Lensch 2010), its stop on
  * value driven by the estimated variance (Schied et al. 2017).
+ *
+ * The loops over a block vectorise, for which they choose between values and not what to compute.
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
 #include "texel_rows.h"
@@ -12,11 +14,7 @@
 enum { CHANNELS = 3 };
 static const float spline[TEXEL_RADIUS + 1] = {0.375f, 0.25f, 0.0625f}; /* B3 spline, from the middle out */
 
-/*
- * The loops over a block vectorise, for which they choose between values and not what to compute.
- *
- * (1 - x / 8)^8, about exp(-x), of which an expf would take most of the time here.
- */
+/* (1 - x / 8)^8, about exp(-x), of which an expf would take most of the time here. */
 static inline float falling(float x) {
     const float t = greater(1 - 0.125f * x, 0), square = t * t, fourth = square * square;
     return fourth * fourth;
