@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ..core.scene import Scene, SceneError, SceneObject
-from .place_mesh import PlacedMesh, place_mesh
+from .place_mesh import PlacedMesh, place_mesh, unit_normals
 from .read_lights import read_lights
 from .read_materials import Materials
 from .read_mesh import MeshArrays, are_finite, read_mesh
@@ -98,11 +98,15 @@ class SceneReading:
         lights = read_lights(self.depsgraph, self.visibility, self.warn)
         world_radiance, environment = read_world(world, self.depsgraph, self.warn)
         first_vertices = np.cumsum([0] + [len(p.vertices) for p in self.placed])
+        vertices = _joined([p.vertices for p in self.placed], np.float64, (0, 3))
         triangles = [p.triangles + first for p, first in zip(self.placed, first_vertices)]
+        triangles = _joined(triangles, np.int32, (0, 3))
+        corner_normals = _joined([p.corner_normals for p in self.placed], np.float32, (0, 3, 3))
+        unit_normals(vertices, triangles, corner_normals, _joined([p.is_flat for p in self.placed], bool, (0,)))
         return Scene(
-            vertices=_joined([p.vertices for p in self.placed], np.float64, (0, 3)),
-            triangles=_joined(triangles, np.int32, (0, 3)),
-            corner_normals=_joined([p.corner_normals for p in self.placed], np.float32, (0, 3, 3)),
+            vertices=vertices,
+            triangles=triangles,
+            corner_normals=corner_normals,
             uvs=_joined([p.uvs for p in self.placed], np.float32, (0, 3, 2)),
             triangle_materials=_joined([p.materials for p in self.placed], np.int32, (0,)),
             objects=self._objects(),

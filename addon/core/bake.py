@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from .denoiser import open_denoiser
+from .denoising import needs_denoising
 from .emitters import emitters_of
 from .gather import Irradiance, gather_irradiance
 from .kernel import KernelScene
@@ -93,7 +94,7 @@ def bake(
             corner_colours[corner_means.triangles] = colours
             corner_colours = sound.spread(corner_colours)
         progress.end()
-        denoiser = _denoiser_used(denoise, no_denoiser, irradiance)
+        denoiser = _denoiser_used(denoise, no_denoiser, irradiance, settings.error)
     report = _report(scene, settings, progress, solved, irradiance, lightmap, denoiser)
     return BakeResult(lightmap, corner_colours, report)
 
@@ -118,11 +119,13 @@ def _require_targets(sound: SoundFaces) -> None:
     raise SceneError("nothing to bake: the scene has no target object with faces")
 
 
-def _denoiser_used(denoise, reason, irradiance) -> str:
+def _denoiser_used(denoise, reason, irradiance, error) -> str:
     """For the report: what was used, or "none" and why."""
     if irradiance.is_denoised:
         return denoise.name
-    return f"none: {reason or denoise.failure or 'no better than smoothing'}"
+    was_asked = needs_denoising(irradiance.relative_error, error)
+    why_not = "no better than smoothing" if was_asked else "not needed for this target"
+    return f"none: {reason or denoise.failure or why_not}"
 
 
 def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap, denoiser) -> Report:

@@ -16,6 +16,12 @@ from .smoothing import TexelGrid
 
 SHARES = 8  # by how far the estimates are apart, each fitted at as many probes,
 LEAST_PROBES_OF_SHARE = 128  # and at no fewer than so many
+NEEDED = 0.125  # of the target: where less error is left, a filter over the whole image is time without use
+
+
+def needs_denoising(rms, error) -> bool:
+    """Whether light of relative error ``rms`` is to be denoised for the target ``error``."""
+    return rms > NEEDED * error
 
 
 def denoised(denoise, grid: TexelGrid, values, direct, gathered, chosen, probes: Measured):

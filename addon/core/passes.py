@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .allocation import measured_errors, next_pass, rays_due
-from .denoising import denoised
+from .denoising import denoised, needs_denoising
 from .gather_job import REPLICATES, GatherJob
 from .gather_sums import no_sums
 from .measuring import probes_among
@@ -158,7 +158,8 @@ def gather_until(
             del due
         is_first = False
         if stopped is not None:
-            found = found if is_asked else _denoised(denoise, grid, found, samples, direct, probes)
+            if not is_asked and needs_denoising(found.rms, error):
+                found = _denoised(denoise, grid, found, samples, direct, probes)
             traced = samples.rays, probes.measured.rays
             return Gathered(found.values, found.rms, stopped, found.is_denoised, *traced)
         del found, scales  # a fine lightmap's are a gigabyte, which the next estimate needs

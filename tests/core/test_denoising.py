@@ -90,11 +90,17 @@ def test_two_estimates_are_mixed_where_the_probes_find_each_better():
 
 def test_a_bake_with_it_is_no_worse_at_points_that_did_not_judge_it(library):
     scene = closed_box(lights=[lamp()])
-    settings = replace(SETTINGS, error=0.3)
+    settings = replace(SETTINGS, error=0.03)
     plain, helped = bake(scene, settings).report, bake(scene, settings, denoiser_library=library).report
     assert helped.denoiser.startswith("Open Image Denoise")
     # 512 points each know their mean square to some 10 %
     assert helped.seen_error < 1.1 * plain.seen_error
+
+
+def test_what_is_far_below_the_target_is_not_denoised(library):
+    report = bake(closed_box(lights=[lamp()]), replace(SETTINGS, error=0.9), denoiser_library=library).report
+    assert report.estimated_error < 0.125 * 0.9
+    assert report.denoiser == "none: not needed for this target"
 
 
 def four_texels():
