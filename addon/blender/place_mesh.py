@@ -12,6 +12,7 @@ from .read_mesh import LIGHTMAP_LAYER, MeshArrays
 DEGENERATE = 1e-12
 AT_ONCE = 1 << 18  # triangles, whose normals take 100 MB while they are made
 
+
 @dataclass(frozen=True, slots=True)
 class PlacedMesh:
     """One object or instance in world space; shapes as in core ``Scene`` and ``SceneObject``, vertices from 0.

@@ -22,22 +22,25 @@ class Images:
 
     def texture(self, image) -> Texture:
         """The image as linear Rec.709 pixels; Unreadable where it has none."""
-        key = image.original.as_pointer()
+        return self._read_once(image, "colour", lambda: linear_pixels(image, self._warn))
+
+    def alpha(self, image) -> Texture:
+        """The image's alpha as a grey."""
+        return self._read_once(image, "alpha", lambda: alpha_pixels(image))
+
+    def _read_once(self, image, what, read):
+        key = image.original.as_pointer(), what
         if key not in self._textures:
-            self._textures[key] = Texture(image.name, linear_pixels(image, self._warn))
+            self._textures[key] = Texture(image.name, read())
         return self._textures[key]
 
 
 def linear_pixels(image, warn) -> np.ndarray:
     """Pixels as float32 (height, width, 3), linear Rec.709, row 0 at the bottom; alpha is ignored."""
-    width, height = image.size
-    if not width or not height:
-        raise Unreadable(f"image '{image.name}', which cannot be loaded")
+    pixels = _stored_pixels(image)
     if image.source in {"TILED", "MOVIE", "SEQUENCE"}:
         warn(f"image '{image.name}': only one picture of its {image.source.lower()} source is read")
-    pixels = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = _rgb(pixels.reshape(height, width, image.channels))
+    pixels = _rgb(pixels)
     if not image.is_float:
         space = image.colorspace_settings.name
         if space not in LINEAR_SPACES:
@@ -47,9 +50,25 @@ def linear_pixels(image, warn) -> np.ndarray:
     return _shrunk(np.clip(np.nan_to_num(pixels, posinf=0.0), 0.0, BRIGHTEST))
 
 
+def alpha_pixels(image) -> np.ndarray:
+    """Alpha as float32 (height, width, 3), three times the same; 1 where the image has none."""
+    pixels = _stored_pixels(image)
+    alpha = pixels[..., 3:4] if pixels.shape[2] == 4 and image.alpha_mode != "NONE" else np.ones_like(pixels[..., :1])
+    return _shrunk(np.clip(np.nan_to_num(np.repeat(alpha, 3, axis=2)), 0.0, 1.0))
+
+
 def mean_colour(pixels) -> tuple[float, float, float]:
     """Mean over a texture's texels."""
     return tuple(float(c) for c in pixels.mean(axis=(0, 1), dtype=np.float64))
+
+
+def _stored_pixels(image):
+    width, height = image.size
+    if not width or not height:
+        raise Unreadable(f"image '{image.name}', which cannot be loaded")
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(height, width, image.channels)
 
 
 def _rgb(pixels):

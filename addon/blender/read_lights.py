@@ -7,6 +7,7 @@ from math import cos, pi, sin
 import numpy as np
 
 from ..core.scene import AreaLight, PointLight, SunLight
+from .colour_nodes import blackbody
 from .shader_nodes import Unreadable, constant, surface_shader
 
 # A hard-edged cone is a very narrow soft one: the smoothstep over it stays finite.
@@ -48,13 +49,21 @@ def _node_factor(lamp, name, warn):
             return np.zeros(3)
         if shader.node.type != "EMISSION":
             raise Unreadable(f"{shader.node.bl_label} node")
-        colour = shader.feeding("Color")
-        if not colour.is_constant:
-            raise Unreadable(f"{colour.node.bl_label} node")
-        return np.array(colour.socket.default_value[:3]) * constant(shader.feeding("Strength"))
+        return _node_colour(shader.feeding("Color")) * constant(shader.feeding("Strength"))
     except Unreadable as error:
         warn(f"light '{name}': its {error} cannot be read: its own colour and power are used")
         return np.ones(3)
+
+
+def _node_colour(reached):
+    """A colour that is the same in all directions."""
+    if reached.is_constant:
+        return np.array(reached.socket.default_value[:3])
+    if reached.node.type == "RGB":
+        return np.array(reached.node.outputs[0].default_value[:3])
+    if reached.node.type == "BLACKBODY":
+        return blackbody(constant(reached.feeding(0)))
+    raise Unreadable(f"{reached.node.bl_label} node")
 
 
 def _is_normalised(lamp):

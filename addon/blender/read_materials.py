@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.scene import Material
+from .colour_nodes import grey, read_colour_node
 from .read_images import Images
 from .shader_nodes import Reached, Unreadable, constant, follow, surface_shader
 from .surfaces import Colour, Surface, weighted_sum
@@ -79,7 +80,7 @@ class MaterialReading:
         """The coordinates of the first image; a second kind is named."""
         kinds = list(dict.fromkeys(self._coordinates))
         if len(kinds) > 1:
-            self._say("its images use different coordinates: those of the first are used for all")
+            self.say("its images use different coordinates: those of the first are used for all")
         return kinds[0] if kinds else Coordinates()
 
     def _surface(self) -> Surface:
@@ -89,7 +90,7 @@ class MaterialReading:
             shader = surface_shader(self._material.node_tree)
             return Surface() if shader is None else self._shader(shader)
         except Unreadable as error:
-            self._say(f"its {error} cannot be read: the viewport colour is used")
+            self.say(f"its {error} cannot be read: the viewport colour is used")
             return Surface(self._viewport_colour())
 
     def _shader(self, reached: Reached) -> Surface:
@@ -103,7 +104,7 @@ class MaterialReading:
         if kind in DIFFUSE:
             return Surface(self._colour(reached.feeding(DIFFUSE[kind])))
         if kind in GLOSSY:
-            self._say(f"its {reached.node.bl_label} is baked as diffuse")
+            self.say(f"its {reached.node.bl_label} is baked as diffuse")
             return Surface(self._colour(reached.feeding(GLOSSY[kind])))
         if kind in PASSING:
             return Surface(transmittance=self._colour(reached.feeding("Color")).mean)
@@ -131,11 +132,10 @@ class MaterialReading:
         return weighted_sum([(alpha, surface), (1 - alpha, Surface(transmittance=np.ones(3)))])
 
     def _alpha(self, reached) -> float:
-        alpha = reached.feeding("Alpha")
         try:
-            return constant(alpha)
-        except Unreadable:
-            self._say("its alpha texture is not read: it is baked opaque")
+            return self._mean_of_factor(reached.feeding("Alpha"), "its alpha comes from an image")
+        except Unreadable as error:
+            self.say(f"its alpha comes from a {error}, which cannot be read: it is baked opaque")
             return 1.0
 
     def _emitted(self, reached, colour_name, strength_name) -> Colour:
@@ -149,63 +149,78 @@ class MaterialReading:
             return constant(reached.feeding(name))
         except Unreadable as error:
             value = float(reached.node.inputs[name].default_value)
-            self._say(f"its {name} comes from a {error}, which cannot be read: {value:g} is used")
+            self.say(f"its {name} comes from a {error}, which cannot be read: {value:g} is used")
             return value
 
     def _mix_factor(self, reached) -> float:
         try:
-            return constant(reached)
+            return self._mean_of_factor(reached, "its shaders are mixed by an image")
         except Unreadable as error:
-            if reached.node.type in BY_VIEW:
-                self._say(f"its shaders are mixed by a {error}: the first one is used")
+            if reached.node is not None and reached.node.type in BY_VIEW:
+                self.say(f"its shaders are mixed by a {error}: the first one is used")
                 return 0.0
-            value = self._mean_of_image(reached)
-            self._say(f"its shaders are mixed by a {error}: they are mixed evenly by {value:.2f}")
-            return value
+            self.say(f"its shaders are mixed by a {error}: they are mixed evenly")
+            return 0.5
 
-    def _mean_of_image(self, reached) -> float:
-        if reached.node.type != "TEX_IMAGE" or reached.node.image is None or reached.socket.identifier == "Alpha":
-            return 0.5
+    def _mean_of_factor(self, reached, what) -> float:
+        """A number for the whole material; Unreadable where there is none."""
+        if reached.is_constant:
+            return constant(reached)
+        coordinates = list(self._coordinates)
+        mean = grey(self.readable_colour(reached)).mean
+        self._coordinates = coordinates  # a mean is the same wherever it is looked up
+        value = round(float(mean[0]), 6)  # opaque to the bit, where it is
+        if 0 < value < 1:
+            self.say(f"{what}: by its mean, {value:.2f}, everywhere")
+        return value
+
+    def factor(self, reached, usual=0.5) -> Colour:
+        """A number that a colour hangs on, which may vary over the surface; ``usual`` where it cannot be read."""
         try:
-            return float(np.mean(Colour(np.ones(3), self._images.texture(reached.node.image)).mean))
-        except Unreadable:
-            return 0.5
+            return grey(self.readable_colour(reached))
+        except Unreadable as error:
+            value = 0.0 if reached.node is not None and reached.node.type in BY_VIEW else usual
+            self.say(f"its colour hangs on a {error}, which cannot be read: {value:g} is used for it")
+            return Colour(np.full(3, value))
 
     def _colour(self, reached) -> Colour:
         try:
-            return self._readable_colour(reached)
+            return self.readable_colour(reached)
         except Unreadable as error:
-            self._say(f"its {error} cannot be read: the viewport colour is used")
+            self.say(f"its {error} cannot be read: the viewport colour is used")
             return self._viewport_colour()
 
-    def _readable_colour(self, reached) -> Colour:
+    def readable_colour(self, reached) -> Colour:
+        """The colour that is reached; Unreadable where it, or a node that makes it, is not known."""
         if reached.is_constant:
             return Colour(_rgb(reached.socket.default_value))
         if reached.node.type == "RGB":
             return Colour(_rgb(reached.node.outputs[0].default_value))
         if reached.node.type == "VALUE":
             return Colour(np.full(3, constant(reached)))
-        if reached.node.type == "TEX_IMAGE" and reached.socket.identifier == "Color":
+        if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
-        raise Unreadable(f"{reached.node.bl_label} node")
+        return read_colour_node(reached, self)
 
     def _image_colour(self, reached) -> Colour:
         if reached.node.image is None:
             raise Unreadable("Image Texture node without an image")
-        colour = Colour(np.ones(3), self._images.texture(reached.node.image))
+        read = self._images.alpha if reached.socket.identifier == "Alpha" else self._images.texture
+        colour = Colour(np.ones(3), read(reached.node.image))
         try:
             if reached.node.projection != "FLAT":
                 raise Unreadable(f"{reached.node.projection.lower()} projection")
             self._coordinates.append(read_coordinates(follow(reached.node.inputs["Vector"], reached.groups)))
         except Unreadable as error:
-            self._say(f"its image '{reached.node.image.name}' uses {error}: the image's mean colour is used")
+            self.say(f"its image '{reached.node.image.name}' uses {error}: the image's mean colour is used")
             return Colour(colour.mean)
         return colour
 
     def _viewport_colour(self) -> Colour:
         return Colour(np.clip(_rgb(self._material.diffuse_color), 0.0, 1.0))
 
-    def _say(self, sentence):
+    def say(self, sentence):
+        """For the report, under the material's name."""
         self._warn(f"material '{self._material.name}': {sentence}")
 
 

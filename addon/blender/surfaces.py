@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..core.scene import Texture
+from ..core.scene import BRIGHTEST, Texture
 from .read_images import mean_colour
 
 BLACK = np.zeros(3)
@@ -67,18 +67,29 @@ def _sum_colours(colours) -> Colour:
         return Colour(sum((colour.value for colour in colours), BLACK))
     if len(textures) == 1 and all(colour.texture is not None for colour in colours):
         return Colour(sum((colour.value for colour in colours), BLACK), colours[0].texture)
-    return Colour(np.ones(3), _sum_textures(colours, list(textures.values())))
+    return pointwise(lambda *values: sum(values), *colours)
 
 
-def _sum_textures(colours, textures) -> Texture:
-    shape = max((texture.pixels.shape for texture in textures), key=lambda shape: shape[0] * shape[1])
-    pixels = np.zeros(shape, np.float32)
-    for colour in colours:
-        pixels += colour.value if colour.texture is None else colour.value * _resampled(colour.texture.pixels, shape)
-    return Texture(" + ".join(texture.name for texture in textures), pixels)
+def pointwise(function, *colours) -> Colour:
+    """What ``function`` of arrays (..., 3) makes of colours, at every texel of the largest of their textures."""
+    textures = {id(colour.texture): colour.texture for colour in colours if colour.texture is not None}
+    if not textures:
+        return Colour(function(*(np.asarray(colour.value, np.float64) for colour in colours)))
+    shape = max((texture.pixels.shape for texture in textures.values()), key=lambda shape: shape[0] * shape[1])
+    pixels = function(*(_pixels_of(colour, shape) for colour in colours))
+    name = " + ".join(texture.name for texture in textures.values())
+    return Colour(np.ones(3), Texture(name, np.clip(pixels, 0.0, BRIGHTEST).astype(np.float32)))
+
+
+def _pixels_of(colour, shape):
+    if colour.texture is None:
+        return np.broadcast_to(np.asarray(colour.value, np.float32), shape)
+    return np.float32(colour.value) * _resampled(colour.texture.pixels, shape)
 
 
 def _resampled(pixels, shape):
+    if pixels.shape == shape:
+        return pixels
     rows = np.arange(shape[0]) * pixels.shape[0] // shape[0]
     columns = np.arange(shape[1]) * pixels.shape[1] // shape[1]
     return pixels[rows[:, None], columns]

@@ -138,6 +138,20 @@ def test_emission_nodes_of_a_lamp_multiply(add_lamp, read):
     np.testing.assert_allclose(light.intensity, np.array(COLOUR) * 2, rtol=FLOAT32)
 
 
+def test_a_black_body_gives_a_lamp_its_colour_and_not_its_power(add_lamp, read):
+    lamp = add_lamp("POINT", energy=4 * pi).data
+    lamp.use_nodes = True
+    emission = next(n for n in lamp.node_tree.nodes if n.type == "EMISSION")
+    kelvin = lamp.node_tree.nodes.new("ShaderNodeBlackbody")
+    kelvin.inputs["Temperature"].default_value = 2700
+    lamp.node_tree.links.new(kelvin.outputs["Color"], emission.inputs["Color"])
+    (light,), scene = read()
+    # luminance is 1 by definition, to the four digits of the matrix; 2700 K is red first and blue last
+    np.testing.assert_allclose(np.array(light.intensity) @ (0.2126, 0.7152, 0.0722), 1.0, rtol=1e-3)
+    assert light.intensity[0] > light.intensity[1] > light.intensity[2] > 0
+    assert scene.warnings == ()
+
+
 def test_unreadable_nodes_of_a_lamp_are_named(add_lamp, read):
     lamp = add_lamp("POINT", "Candle", energy=4 * pi).data
     lamp.use_nodes = True

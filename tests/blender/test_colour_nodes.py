@@ -1,0 +1,259 @@
+"""Nodes between an image and a shader, held against what Cycles bakes of the same material."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.blender.colour_nodes import blackbody
+from addon.blender.read_scene import read_scene
+
+pytestmark = pytest.mark.usefixtures("empty_file")
+
+SIDE = 8
+TABLES = 2e-3  # Cycles looks ramps and curves up in tables of 256 entries, in 32 bits
+ROUNDING = 2e-5  # chains of 32-bit numbers of about 1
+LUMINANCE = 1.5e-4  # Blender's weights of luminance have seven digits, ours the four of Rec.709: 7e-5, and powers of it
+
+
+def colours(seed):
+    """An image (SIDE, SIDE, 3) that has black, white and a grey in it."""
+    pixels = np.random.default_rng(seed).random((SIDE, SIDE, 3)).astype(np.float32)
+    pixels[0, :3] = [[0, 0, 0], [1, 1, 1], [0.5, 0.5, 0.5]]
+    return pixels
+
+
+@pytest.fixture
+def plane(add_mesh):
+    """A unit square whose UVs are its x and y."""
+    plane = add_mesh("Plane", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
+    plane.data.uv_layers.new(name="UVMap").uv.foreach_set("vector", [0, 0, 1, 0, 1, 1, 0, 1])
+    return plane
+
+
+def baked_by_cycles(plane, material):
+    """Pixels (SIDE, SIDE, 3) of Cycles' bake of the base colour: at texel centres, where lookups do not interpolate."""
+    image = bpy.data.images.new("Baked", SIDE, SIDE, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    material.node_tree.nodes.active = node
+    bpy.context.scene.render.engine = "CYCLES"
+    bpy.context.scene.cycles.samples = 1
+    bpy.context.view_layer.objects.active = plane
+    plane.select_set(True)
+    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"COLOR"}, margin=0)
+    return np.array(image.pixels[:]).reshape(SIDE, SIDE, 4)[..., :3]
+
+
+def image_node(tree, image):
+    node = tree.new("TexImage")
+    node.image, node.interpolation = image, "Closest"
+    return node
+
+
+@pytest.fixture
+def compare(nodes, add_image, plane):
+    """Hold the reading of ``make(tree, first image's node, second one's)``, a node, against Cycles' bake."""
+
+    def check(make, socket=0, tolerance=ROUNDING, seed=0):
+        material, tree = nodes()
+        images = [image_node(tree, add_image(colours(seed + k), is_float=True, space="Non-Color")) for k in (0, 1)]
+        diffuse = tree.new("BsdfDiffuse")
+        tree.link(make(tree, *images), diffuse, socket, "Color")
+        tree.show(diffuse)
+        plane.data.materials.append(material)
+        scene = read_scene(bpy.context.scene)
+        assert scene.warnings == ()
+        found = scene.materials[scene.triangle_materials[0]]
+        read = np.array(found.reflectance)
+        if found.reflectance_texture is not None:
+            read = read * found.reflectance_texture.pixels
+        expected = np.clip(baked_by_cycles(plane, material), 0, 1)
+        np.testing.assert_allclose(np.broadcast_to(read, expected.shape), expected, atol=tolerance)
+        assert np.ptp(expected) > 0.1
+
+    return check
+
+
+BLENDS = ["MIX", "ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "SCREEN", "OVERLAY", "SOFT_LIGHT", "LINEAR_LIGHT"]
+BLENDS += ["DIFFERENCE", "EXCLUSION", "DARKEN", "LIGHTEN"]
+
+
+@pytest.mark.parametrize("blend", BLENDS)
+def test_a_mix_of_two_images(compare, blend):
+    def mix(tree, first, second):
+        node = tree.new("Mix")
+        node.data_type, node.blend_type = "RGBA", blend
+        node.inputs[0].default_value = 0.375
+        tree.link(first, node, "Color", 6)
+        return tree.link(second, node, "Color", 7)
+
+    compare(mix, socket=2)
+
+
+def test_a_mix_by_an_image_is_clamped_where_it_says_so(compare):
+    def mix(tree, first, second):
+        node = tree.new("Mix")
+        node.data_type, node.blend_type, node.clamp_result = "RGBA", "ADD", True
+        node.inputs[6].default_value, node.inputs[7].default_value = (0.1, 0.5, 0.9, 1), (0.8, 0.2, 0.4, 1)
+        return tree.link(first, node, "Color", 0)
+
+    compare(mix, socket=2, tolerance=LUMINANCE)
+
+
+def test_a_mix_of_the_old_kind(compare):
+    def mix(tree, first, second):
+        node = tree.new("MixRGB")
+        node.blend_type = "MULTIPLY"
+        node.inputs[0].default_value = 0.75
+        tree.link(first, node, "Color", 1)
+        return tree.link(second, node, "Color", 2)
+
+    compare(mix)
+
+
+@pytest.mark.parametrize("interpolation", ["LINEAR", "EASE", "CONSTANT"])
+def test_a_ramp(compare, interpolation):
+    def ramp(tree, first, second):
+        node = tree.new("ValToRGB")
+        node.color_ramp.interpolation = interpolation
+        node.color_ramp.elements[0].color = (0.9, 0.1, 0.2, 1)
+        node.color_ramp.elements.new(0.4).color = (0.1, 0.8, 0.3, 1)
+        return tree.link(first, node, "Color", 0)
+
+    compare(ramp, tolerance=TABLES)
+
+
+def test_curves(compare):
+    def curves(tree, first, second):
+        node = tree.new("RGBCurve")
+        node.mapping.curves[3].points.new(0.3, 0.6)
+        node.mapping.curves[0].points.new(0.5, 0.2)
+        node.mapping.update()
+        node.inputs[0].default_value = 0.8
+        return tree.link(first, node, "Color", 1)
+
+    compare(curves, tolerance=TABLES)
+
+
+@pytest.mark.parametrize(
+    ("kind", "numbers", "at"),
+    [
+        ("HueSaturation", {0: 0.7, 1: 0.6, 2: 0.9, 3: 0.8}, 4),
+        ("HueSaturation", {0: 0.2, 1: 1.8, 2: 1.0, 3: 1.0}, 4),
+        ("Gamma", {1: 2.2}, 0),
+        ("Gamma", {1: 0.4}, 0),
+        ("Invert", {0: 0.75}, 1),
+        ("BrightContrast", {1: 0.1, 2: 0.4}, 0),
+        ("RGBToBW", {}, 0),
+    ],
+)
+def test_what_changes_a_colour(compare, kind, numbers, at):
+    def node_of(tree, first, second):
+        node = tree.new(kind)
+        for k, number in numbers.items():
+            node.inputs[k].default_value = number
+        return tree.link(first, node, "Color", at)
+
+    compare(node_of, tolerance=LUMINANCE if kind == "RGBToBW" else ROUNDING)
+
+
+@pytest.mark.parametrize("operation", ["ADD", "SUBTRACT", "MULTIPLY", "MINIMUM", "MAXIMUM", "DIVIDE", "POWER"])
+def test_arithmetic(compare, operation):
+    def node_of(tree, first, second):
+        node = tree.new("Math")
+        node.operation, node.use_clamp = operation, True
+        node.inputs[1].default_value = 0.6
+        return tree.link(first, node, "Color", 0)
+
+    compare(node_of, tolerance=LUMINANCE)
+
+
+@pytest.mark.parametrize("kelvin", [1900, 2700, 4000, 6500, 9000, 20000])
+def test_a_black_body(nodes, plane, kelvin):
+    material, tree = nodes()
+    diffuse = tree.new("BsdfDiffuse")
+    tree.show(tree.link(tree.new("Blackbody", Temperature=kelvin), diffuse, 0, "Color"))
+    expected = baked_by_cycles(plane_of(plane, material), material)[0, 0]
+    # Cycles' colours are fits of their own: within 2 % of each channel, or of the luminance where there is little
+    np.testing.assert_allclose(blackbody(kelvin), np.maximum(expected, 0), rtol=0.02, atol=0.02)
+
+
+def plane_of(plane, material):
+    plane.data.materials.append(material)
+    return plane
+
+
+def test_images_of_two_sizes_are_mixed_at_the_finer_one(nodes, add_image, plane):
+    material, tree = nodes()
+    coarse = np.array([[[0.2] * 3, [0.8] * 3]], np.float32)
+    node = tree.new("Mix")
+    node.data_type = "RGBA"
+    node.inputs[0].default_value = 0.5
+    tree.link(image_node(tree, add_image(colours(0), is_float=True, space="Non-Color")), node, "Color", 6)
+    tree.link(image_node(tree, add_image(coarse, is_float=True, space="Non-Color")), node, "Color", 7)
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), 2, "Color"))
+    plane.data.materials.append(material)
+    scene = read_scene(bpy.context.scene)
+    found = scene.materials[scene.triangle_materials[0]].reflectance_texture.pixels
+    expected = colours(0) / 2
+    expected[:, : SIDE // 2] += 0.1
+    expected[:, SIDE // 2 :] += 0.4
+    np.testing.assert_allclose(found, expected, atol=1e-6)  # float32
+
+
+def read_with_warnings(plane, material):
+    plane.data.materials.append(material)
+    scene = read_scene(bpy.context.scene)
+    return scene.materials[scene.triangle_materials[0]], scene.warnings
+
+
+def test_colours_mixed_by_noise_are_mixed_evenly_and_it_is_said(nodes, plane):
+    material, tree = nodes("Wall")
+    node = tree.new("Mix")
+    node.data_type = "RGBA"
+    node.inputs[6].default_value, node.inputs[7].default_value = (0.25, 0.5, 0.25, 1), (0.75, 0.5, 0.25, 1)
+    tree.link(tree.new("TexNoise"), node, 0, 0)
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), 2, "Color"))
+    found, warnings = read_with_warnings(plane, material)
+    np.testing.assert_allclose(found.reflectance, (0.5, 0.5, 0.25), atol=1e-6)  # luminance weights, in 64 bits
+    assert len(warnings) == 1
+    assert "'Wall'" in warnings[0]
+    assert "Noise Texture" in warnings[0]
+
+
+def test_a_ramp_of_noise_is_its_mean_and_it_is_said(nodes, plane):
+    material, tree = nodes("Wood")
+    ramp = tree.link(tree.new("TexNoise"), tree.new("ValToRGB"), 0, 0)
+    tree.show(tree.link(ramp, tree.new("BsdfDiffuse"), 0, "Color"))
+    found, warnings = read_with_warnings(plane, material)
+    np.testing.assert_allclose(found.reflectance, [0.5] * 3, atol=1e-6)  # black to white
+    assert len(warnings) == 1
+    assert "'Wood'" in warnings[0]
+
+
+def test_an_alpha_image_lets_its_share_through_and_it_is_said(nodes, plane):
+    image = bpy.data.images.new("Leaf", 2, 2, alpha=True, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(np.array([0.5, 0.5, 0.5, 1.0] + 3 * [0.5, 0.5, 0.5, 0.0], np.float32))
+    material, tree = nodes("Leaf")
+    node, principled = image_node(tree, image), tree.new("BsdfPrincipled")
+    tree.link(node, principled, "Color", "Base Color")
+    tree.show(tree.link(node, principled, "Alpha", "Alpha"))
+    found, warnings = read_with_warnings(plane, material)
+    assert found.transmittance == (0.75, 0.75, 0.75)
+    np.testing.assert_allclose(found.reflectance_texture.pixels * found.reflectance, 0.125)
+    assert len(warnings) == 1
+    assert "'Leaf'" in warnings[0]
+    assert "0.25" in warnings[0]
+
+
+def test_an_image_whose_alpha_is_one_is_opaque_without_a_word(nodes, add_image, plane):
+    material, tree = nodes()
+    node, principled = image_node(tree, add_image(colours(0))), tree.new("BsdfPrincipled")
+    tree.show(tree.link(node, principled, "Alpha", "Alpha"))
+    found, warnings = read_with_warnings(plane, material)
+    assert found.transmittance == (0, 0, 0)
+    assert warnings == ()
