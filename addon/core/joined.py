@@ -115,6 +115,6 @@ def _joined_by(kernel: KernelScene, grid: Grid, pieces: Patches, first) -> Patch
 
 def _normals(scene: Scene, triangles):
     """Unit normals of triangles (K,), float64 (K, 3)."""
-    a, b, c = np.moveaxis(scene.vertices[scene.triangles[triangles]], 1, 0)
+    a, b, c = (scene.vertices[scene.triangles[triangles, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return normals / np.maximum(np.sqrt(np.einsum("nk,nk->n", normals, normals)), 1e-300)[:, None]

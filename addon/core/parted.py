@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .kernel import KernelScene
-from .patches import Grid, Patches, cut
+from .patches import Grid, Patches, laid_out, with_reflectance
 from .scene import Scene
 
 POINTS, LIFT = 8, 0.05  # of a side, so many of its sizes above it: where it is looked for what stands on it,
@@ -46,9 +46,10 @@ def _blocked_sides(scene, kernel, patches, chosen, seed):
 def finer_where_parted(scene: Scene, kernel: KernelScene, grid: Grid, most: int, seed: int) -> Patches:
     """Patches of a grid, one a cell; those that are parted are cut into smaller ones, ``most`` more in all."""
     whole = np.ones(len(grid), np.int64)
-    patches = cut(scene, kernel, grid, whole, seed)
+    patches = laid_out(kernel, grid, whole)
     parted = is_parted(scene, kernel, patches, seed).reshape(-1, 2).any(axis=1)
     for along in ALONG:
         if 0 < (along**2 - 1) * parted.sum() <= most:
-            return cut(scene, kernel, grid, np.where(parted, along, whole), seed)
-    return patches
+            patches = laid_out(kernel, grid, np.where(parted, along, whole))
+            break
+    return with_reflectance(scene, kernel, patches, seed)

@@ -7,7 +7,7 @@ native/include/patchlight.h.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,6 +121,11 @@ def grid_of(scene: Scene, size: float, budget: int) -> Grid:
 
 def cut(scene: Scene, kernel: KernelScene, grid: Grid, along, seed: int) -> Patches:
     """Patches of a grid, ``along`` (C,) of them along each side of every cell; the kernel is told of them."""
+    return with_reflectance(scene, kernel, laid_out(kernel, grid, along), seed)
+
+
+def laid_out(kernel: KernelScene, grid: Grid, along) -> Patches:
+    """The same that reflect nothing yet."""
     first_pieces = _offsets(along**2)
     kernel.set_patches(grid.apexes, grid.first_rows, grid.first_cells, first_pieces.astype(np.int32))
     rows, columns = np.diff(grid.first_rows), np.diff(grid.first_cells)
@@ -141,7 +146,7 @@ def cut(scene: Scene, kernel: KernelScene, grid: Grid, along, seed: int) -> Patc
         size=grid.size,
         areas=grid.areas[triangles] * shares,
         triangles=triangles.astype(np.int32),
-        reflectance=_mean_reflectance(scene, kernel, triangles.astype(np.int32), seed),
+        reflectance=np.zeros((len(triangles), 3), np.float32),
         bounds=bounds.astype(np.float32),
         apexes=grid.apexes,
         cells=cells.astype(np.int32),
@@ -203,14 +208,14 @@ def _offsets(counts):
     return np.concatenate([[0], np.cumsum(counts)])
 
 
-def _mean_reflectance(scene: Scene, kernel: KernelScene, triangles, seed: int):
-    """Reflectance float32 (P, 3) of the kernel's patches, each of the material of one of its triangles (P,)."""
+def with_reflectance(scene: Scene, kernel: KernelScene, patches: Patches, seed: int) -> Patches:
+    """The patches, as the kernel has them, each with the mean reflectance of its triangle's material over it."""
     factors = np.array([m.reflectance for m in scene.materials], np.float32).reshape(-1, 3)
-    materials = scene.triangle_materials[triangles]
+    materials = scene.triangle_materials[patches.triangles]
     reflectance = factors[materials]
     is_textured = np.array([m.reflectance_texture is not None for m in scene.materials], bool)[materials]
     textured = np.flatnonzero(is_textured)
     points, barycentrics = kernel.patch_points(textured, TEXTURE_SAMPLES, seed)
     colours = textured_colours(scene, points, barycentrics, "reflectance", "reflectance_texture")
     reflectance[textured] = colours.reshape(-1, TEXTURE_SAMPLES, 3).mean(axis=1)
-    return np.clip(reflectance, 0.0, 1.0)
+    return replace(patches, reflectance=np.clip(reflectance, 0.0, 1.0))
