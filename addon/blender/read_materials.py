@@ -176,17 +176,21 @@ class MaterialReading:
 
     def factor(self, reached, usual=0.5) -> Colour:
         """A number that a colour hangs on, which may vary over the surface; ``usual`` where it cannot be read."""
+        coordinates = list(self._coordinates)
         try:
             return grey(self.readable_colour(reached))
         except Unreadable as error:
+            self._coordinates = coordinates  # of images that nobody looks at
             value = 0.0 if reached.node is not None and reached.node.type in BY_VIEW else usual
             self.say(f"its colour hangs on a {error}, which cannot be read: {value:g} is used for it")
             return Colour(np.full(3, value))
 
     def _colour(self, reached) -> Colour:
+        coordinates = list(self._coordinates)
         try:
             return self.readable_colour(reached)
         except Unreadable as error:
+            self._coordinates = coordinates  # of images that nobody looks at
             self.say(f"its {error} cannot be read: the viewport colour is used")
             return self._viewport_colour()
 

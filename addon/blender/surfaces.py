@@ -71,14 +71,21 @@ def _sum_colours(colours) -> Colour:
 
 
 def pointwise(function, *colours) -> Colour:
-    """What ``function`` of arrays (..., 3) makes of colours, at every texel of the largest of their textures."""
+    """What ``function`` of arrays (..., 3) makes of colours, at every texel of the largest of their textures.
+
+    What comes out below 0, which light cannot, is 0.
+    """
     textures = {id(colour.texture): colour.texture for colour in colours if colour.texture is not None}
     if not textures:
-        return Colour(function(*(np.asarray(colour.value, np.float64) for colour in colours)))
+        return Colour(_possible(function(*(np.asarray(colour.value, np.float64) for colour in colours))))
     shape = max((texture.pixels.shape for texture in textures.values()), key=lambda shape: shape[0] * shape[1])
-    pixels = function(*(_pixels_of(colour, shape) for colour in colours))
+    pixels = _possible(function(*(_pixels_of(colour, shape) for colour in colours)))
     name = " + ".join(texture.name for texture in textures.values())
-    return Colour(np.ones(3), Texture(name, np.clip(pixels, 0.0, BRIGHTEST).astype(np.float32)))
+    return Colour(np.ones(3), Texture(name, pixels.astype(np.float32)))
+
+
+def _possible(values):
+    return np.clip(np.nan_to_num(values, posinf=BRIGHTEST), 0.0, BRIGHTEST)
 
 
 def _pixels_of(colour, shape):

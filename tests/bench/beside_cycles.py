@@ -5,8 +5,8 @@
 Cycles bakes with all objects joined into one mesh, its best case: as they are it starts anew for each object, which
 ``--as-it-is`` measures too. Only its bake operator is timed; ours is the report's ``seconds.bake``: neither unwraps.
 Where pyoidn is installed, each joined bake is denoised, too (Open Image Denoise, filter RTLightmap), its time added.
-Two comparisons are printed: the time to a p50 of 1 %, Cycles' by 1 / sqrt(N), and that to be as good in p50 and in p95 as
-each row of ours.
+Two comparisons are printed: the time to a p50 of 1 %, Cycles' by 1 / sqrt(N), and that to be as good in p50 and in
+p95 as each row of ours.
 """
 
 from __future__ import annotations
@@ -175,8 +175,8 @@ def seconds_at_aim(rows) -> float:
 def seconds_to_match(theirs, wanted) -> float:
     """Time until p50 and p95 are both as good as in the row ``wanted``.
 
-    It is found on a line through the logarithms of two rows, those about it or else the last two; infinite where these do
-    not fall.
+    It is found on a line through the logarithms of two rows, those about it or else the last two; infinite where these
+    do not fall.
     """
     return max(seconds_until(theirs, measure, wanted[measure]) for measure in ("p50", "p95"))
 
