@@ -2,6 +2,7 @@
 # make test   set everything up, run the tests
 # make fuzz   ten thousand random scenes baked whole (a quarter of an hour), and random calls of the kernel
 # make sanitize  the core's and the physics' tests over a kernel with address and undefined-behaviour checks
+# make test-window BLENDER=blender  the extension's zip in a real window of Blender: Bake pressed, watched, undone, cancelled
 # make bench  speed against error on exact scenes, quick settings: a table, and JSON and plots in out/bench
 # make bench-cycles SCENE=S.blend REFERENCE=S.npz  seconds and error beside Cycles' own bake of the same texels
 # make bench-rays SCENE=S.blend  our kernels' rays per second against a bare loop over the same rays
@@ -26,7 +27,7 @@ WARNINGS := -Wall -Wextra -Wshadow -Wconversion -Wstrict-prototypes -Werror
 SANITIZE := -std=c11 -O1 -g -ffp-contract=off -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=all
 C_TESTS := $(patsubst tests/native/%.c,$(BUILD)/native/%,$(wildcard tests/native/test_*.c))
 
-.PHONY: bake test bench bench-cycles bench-rays bench-size fuzz sanitize check lint native-tests kernel zip format clean distclean
+.PHONY: bake test test-window bench bench-cycles bench-rays bench-size fuzz sanitize check lint native-tests kernel zip format clean distclean
 .DELETE_ON_ERROR:
 
 # ---- set-up: each stamp is newer than what it was made from ----
@@ -144,6 +145,14 @@ zip: kernel $(VENV)/.zig
 ifeq ($(shell uname -sm),Linux x86_64)
 	PATCHLIGHT_TEST_KERNEL=$(ZIPPED) $(BIN)/python -m pytest -q tests/core/test_kernel.py tests/core/test_bake.py
 endif
+
+# on a machine without a screen Xvfb stands in for one
+test-window: kernel $(VENV)/.zig
+	@test -n "$(BLENDER)" || { echo "say BLENDER=/path/to/blender"; exit 1; }
+	mkdir -p $(OUT)/window/profile
+	ZIP=$$($(BIN)/python native/build.py linux-x64 --output $(CURDIR)/$(OUT)/window) && \
+	    BLENDER_USER_RESOURCES=$(CURDIR)/$(OUT)/window/profile $(if $(DISPLAY),,xvfb-run -a) $(BLENDER) --factory-startup \
+	    --enable-event-simulate --python tests/window/press_bake.py -- $$ZIP
 
 format: $(VENV)/.installed
 	$(BIN)/ruff check --fix-only .
