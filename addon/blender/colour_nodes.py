@@ -73,13 +73,19 @@ def _mix(reached, reading):
         raise Unreadable(f"{node.bl_label} node of vectors")
     if blend not in BLENDS:
         raise Unreadable(f"{node.bl_label} node that blends by {blend.replace('_', ' ').lower()}")
+    is_of_numbers = node.type == "MIX" and node.data_type == "FLOAT"
+
+    def read(number):
+        colour = reading.readable_colour(reached.feeding(number))
+        return grey(colour) if is_of_numbers else colour
 
     def mixed(t, a, b):
         return a + (np.clip(t, 0, 1) if clamps_factor else t) * (BLENDS[blend](a, b) - a)
 
-    factor, first, second = (reached.feeding(number) for number in inputs)
-    colours = reading.readable_colour(first), reading.readable_colour(second)
-    return _clamped(pointwise(mixed, reading.factor(factor), *colours), clamps)
+    factor = reading.factor(reached.feeding(inputs[0]))
+    if factor.is_black:  # the other side need not be readable
+        return _clamped(read(inputs[1]), clamps)
+    return _clamped(pointwise(mixed, factor, read(inputs[1]), read(inputs[2])), clamps)
 
 
 def _ramp(reached, reading):
@@ -93,15 +99,23 @@ def _ramp(reached, reading):
         return Colour(table.mean(axis=0))
     if ramp.interpolation == "CONSTANT":
         return pointwise(lambda c: table[(np.clip(c[..., 0], 0, 1) * (TABLE - 1)).astype(int)], factor)
-    return pointwise(lambda c: _looked_up([table[:, k] for k in range(3)], c), factor)
+    return pointwise(lambda c: _looked_up(table.T, c), factor)
 
 
 def _curves(reached, reading):
     mapping = reached.node.mapping
     mapping.initialize()
     combined = [mapping.evaluate(mapping.curves[3], x) for x in np.linspace(0, 1, TABLE)]
-    tables = [[mapping.evaluate(mapping.curves[k], x) for x in combined] for k in range(3)]
-    return _partly(lambda c: _looked_up(tables, c), reached, reading)
+    tables = np.array([[mapping.evaluate(mapping.curves[k], x) for x in combined] for k in range(3)])
+    goes_on = mapping.extend == "EXTRAPOLATED"
+
+    def curved(c):
+        # beyond the table as at its end
+        below, above = np.minimum(c, 0), np.maximum(c - 1, 0)
+        slopes = (tables[:, 1] - tables[:, 0]) * (TABLE - 1), (tables[:, -1] - tables[:, -2]) * (TABLE - 1)
+        return _looked_up(tables, c) + goes_on * (below * slopes[0] + above * slopes[1])
+
+    return _partly(curved, reached, reading)
 
 
 def _looked_up(tables, colours):

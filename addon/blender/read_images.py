@@ -26,7 +26,7 @@ class Images:
 
     def alpha(self, image) -> Texture:
         """The image's alpha as a grey."""
-        return self._read_once(image, "alpha", lambda: alpha_pixels(image))
+        return self._read_once(image, "alpha", lambda: alpha_pixels(image, self._warn))
 
     def _read_once(self, image, what, read):
         key = image.original.as_pointer(), what
@@ -37,24 +37,22 @@ class Images:
 
 def linear_pixels(image, warn) -> np.ndarray:
     """Pixels as float32 (height, width, 3), linear Rec.709, row 0 at the bottom; alpha is ignored."""
-    pixels = _stored_pixels(image)
-    if image.source in {"TILED", "MOVIE", "SEQUENCE"}:
-        warn(f"image '{image.name}': only one picture of its {image.source.lower()} source is read")
-    pixels = _rgb(pixels)
+    pixels = _rgb(_stored_pixels(image, warn))
     if not image.is_float:
         space = image.colorspace_settings.name
         if space not in LINEAR_SPACES:
             pixels = _linear_from_srgb_bytes(pixels)
             if space != "sRGB":
                 warn(f"image '{image.name}': colour space {space} is read as sRGB")
-    return _shrunk(np.clip(np.nan_to_num(pixels, posinf=0.0), 0.0, BRIGHTEST))
+    return shrunk(np.clip(np.nan_to_num(pixels, posinf=0.0), 0.0, BRIGHTEST), LONGEST_SIDE)
 
 
-def alpha_pixels(image) -> np.ndarray:
+def alpha_pixels(image, warn) -> np.ndarray:
     """Alpha as float32 (height, width, 3), three times the same; 1 where the image has none."""
-    pixels = _stored_pixels(image)
+    pixels = _stored_pixels(image, warn)
     alpha = pixels[..., 3:4] if pixels.shape[2] == 4 and image.alpha_mode != "NONE" else np.ones_like(pixels[..., :1])
-    return _shrunk(np.clip(np.nan_to_num(np.repeat(alpha, 3, axis=2)), 0.0, 1.0))
+    alpha = shrunk(np.clip(np.nan_to_num(alpha), 0.0, 1.0), LONGEST_SIDE)
+    return np.repeat(alpha, 3, axis=2)
 
 
 def mean_colour(pixels) -> tuple[float, float, float]:
@@ -62,10 +60,23 @@ def mean_colour(pixels) -> tuple[float, float, float]:
     return tuple(float(c) for c in pixels.mean(axis=(0, 1), dtype=np.float64))
 
 
-def _stored_pixels(image):
+def shrunk(pixels, longest):
+    """Pixels (height, width, channels), box-filtered by a whole factor until no side is longer than ``longest``."""
+    factor = -(-max(pixels.shape[:2]) // longest)
+    if factor == 1:
+        return np.ascontiguousarray(pixels)
+    height, width = (max(side // factor, 1) for side in pixels.shape[:2])
+    across, down = min(factor, pixels.shape[1]), min(factor, pixels.shape[0])
+    blocks = pixels[: height * down, : width * across].reshape(height, down, width, across, -1)
+    return np.ascontiguousarray(blocks.mean(axis=(1, 3), dtype=np.float32))
+
+
+def _stored_pixels(image, warn):
     width, height = image.size
     if not width or not height:
         raise Unreadable(f"image '{image.name}', which cannot be loaded")
+    if image.source in {"TILED", "MOVIE", "SEQUENCE"}:
+        warn(f"image '{image.name}': only one picture of its {image.source.lower()} source is read")
     pixels = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(pixels)
     return pixels.reshape(height, width, image.channels)
@@ -81,14 +92,3 @@ def _linear_from_srgb_bytes(pixels):
     encoded = np.arange(256) / 255.0
     table = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
     return table[np.clip(np.rint(pixels * 255), 0, 255).astype(np.uint8)]
-
-
-def _shrunk(pixels):
-    """Box-filtered by a whole factor until no side is longer than LONGEST_SIDE."""
-    factor = -(-max(pixels.shape[:2]) // LONGEST_SIDE)
-    if factor == 1:
-        return np.ascontiguousarray(pixels)
-    height, width = (max(side // factor, 1) for side in pixels.shape[:2])
-    across, down = min(factor, pixels.shape[1]), min(factor, pixels.shape[0])
-    blocks = pixels[: height * down, : width * across].reshape(height, down, width, across, 3)
-    return np.ascontiguousarray(blocks.mean(axis=(1, 3), dtype=np.float32))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core.scene import AreaLight, PointLight, SunLight
 from .colour_nodes import blackbody
-from .shader_nodes import Unreadable, constant, surface_shader
+from .shader_nodes import Unreadable, constant, constant_colour, surface_shader
 
 # A hard-edged cone is a very narrow soft one: the smoothstep over it stays finite.
 NARROWEST_CONE_EDGE = 1e-6
@@ -57,13 +57,9 @@ def _node_factor(lamp, name, warn):
 
 def _node_colour(reached):
     """A colour that is the same in all directions."""
-    if reached.is_constant:
-        return np.array(reached.socket.default_value[:3])
-    if reached.node.type == "RGB":
-        return np.array(reached.node.outputs[0].default_value[:3])
-    if reached.node.type == "BLACKBODY":
+    if not reached.is_constant and reached.node.type == "BLACKBODY":
         return blackbody(constant(reached.feeding(0)))
-    raise Unreadable(f"{reached.node.bl_label} node")
+    return constant_colour(reached)
 
 
 def _is_normalised(lamp):

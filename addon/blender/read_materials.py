@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.scene import Material
+from ..core.scene import BRIGHTEST, Material
 from .colour_nodes import grey, read_colour_node
 from .read_images import Images
-from .shader_nodes import Reached, Unreadable, constant, follow, surface_shader
-from .surfaces import Colour, Surface, weighted_sum
+from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, surface_shader
+from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
 
 NO_MATERIAL = Material("no material")
@@ -46,42 +46,58 @@ class Materials:
             return 0
         key = material.original.as_pointer()
         if key not in self._indices:
-            reading = MaterialReading(material.evaluated_get(self._depsgraph), self._images, self._warn)
+            reading = MaterialReading(material.evaluated_get(self._depsgraph), self._images)
             self._indices[key] = len(self.entries)
             self.entries.append(reading.material())
             self.coordinates.append(reading.coordinates())
+            for sentence in reading.sentences():
+                self._warn(f"material '{material.name}': {sentence}")
         return self._indices[key]
 
 
-class MaterialReading:
-    """One material being read: its name for the warnings, the coordinates that its images ask for."""
+class Notes:
+    """What is to be remembered of nodes that were read, each once: images' coordinates, sentences for the report."""
 
-    def __init__(self, blender_material, images, warn):
+    def __init__(self):
+        self.coordinates, self.sentences = {}, {}
+
+    def add(self, other) -> None:
+        self.coordinates |= other.coordinates
+        self.sentences |= other.sentences
+
+
+class MaterialReading:
+    """One material being read, each node once; what is noted of a node that turns out unreadable is forgotten."""
+
+    def __init__(self, blender_material, images):
         self._material = blender_material
         self._images = images
-        self._warn = warn
-        self._coordinates = []
+        self._notes = Notes()
+        self._read = {}
 
     def material(self) -> Material:
         """The core material; never silently black."""
         surface = self._surface()
-        reflectance = surface.reflectance.within_one()
-        radiance = surface.radiance
+        reflectance, radiance = surface.reflectance.within(1.0), surface.radiance.within(BRIGHTEST)
         return Material(
             self._material.name,
             tuple(float(x) for x in reflectance.value),
             reflectance.texture,
-            tuple(float(max(x, 0.0)) for x in radiance.value),
+            tuple(float(x) for x in radiance.value),
             radiance.texture,
             tuple(float(x) for x in np.clip(surface.transmittance, 0.0, 1.0)),
         )
 
     def coordinates(self) -> Coordinates:
         """The coordinates of the first image; a second kind is named."""
-        kinds = list(dict.fromkeys(self._coordinates))
+        kinds = list(self._notes.coordinates)
         if len(kinds) > 1:
             self.say("its images use different coordinates: those of the first are used for all")
         return kinds[0] if kinds else Coordinates()
+
+    def sentences(self) -> list[str]:
+        """For the report."""
+        return list(self._notes.sentences)
 
     def _surface(self) -> Surface:
         if not self._material.use_nodes or self._material.node_tree is None:
@@ -90,6 +106,7 @@ class MaterialReading:
             shader = surface_shader(self._material.node_tree)
             return Surface() if shader is None else self._shader(shader)
         except Unreadable as error:
+            self._notes = Notes()
             self.say(f"its {error} cannot be read: the viewport colour is used")
             return Surface(self._viewport_colour())
 
@@ -107,7 +124,7 @@ class MaterialReading:
             self.say(f"its {reached.node.bl_label} is baked as diffuse")
             return Surface(self._colour(reached.feeding(GLOSSY[kind])))
         if kind in PASSING:
-            return Surface(transmittance=self._colour(reached.feeding("Color")).mean)
+            return Surface(transmittance=self._colour(reached.feeding("Color")).within(1.0).mean)
         if kind == "MIX_SHADER":
             factor = min(max(self._mix_factor(reached.feeding(0)), 0.0), 1.0)
             return self._sum(((1 - factor, reached.feeding(1)), (factor, reached.feeding(2))))
@@ -121,7 +138,7 @@ class MaterialReading:
         return weighted_sum([(weight, self._shader(reached)) for weight, reached in parts if weight > 0])
 
     def _principled(self, reached) -> Surface:
-        base = self._colour(reached.feeding("Base Color")).within_one()
+        base = self._colour(reached.feeding("Base Color")).within(1.0)
         transmission = self._number(reached, "Transmission Weight")
         radiance = self._emitted(reached, "Emission Color", "Emission Strength")
         if transmission >= 0.5:
@@ -156,52 +173,58 @@ class MaterialReading:
         try:
             return self._mean_of_factor(reached, "its shaders are mixed by an image")
         except Unreadable as error:
-            if reached.node is not None and reached.node.type in BY_VIEW:
+            if reached.node.type in BY_VIEW:
                 self.say(f"its shaders are mixed by a {error}: the first one is used")
                 return 0.0
             self.say(f"its shaders are mixed by a {error}: they are mixed evenly")
             return 0.5
 
     def _mean_of_factor(self, reached, what) -> float:
-        """A number for the whole material; Unreadable where there is none."""
-        if reached.is_constant:
-            return constant(reached)
-        coordinates = list(self._coordinates)
-        mean = grey(self.readable_colour(reached)).mean
-        self._coordinates = coordinates  # a mean is the same wherever it is looked up
-        value = round(float(mean[0]), 6)  # opaque to the bit, where it is
-        if 0 < value < 1:
+        """A number of [0, 1] for the whole material; Unreadable where there is none."""
+        coordinates = dict(self._notes.coordinates)
+        factor = pointwise(lambda c: np.clip(c, 0, 1), grey(self.readable_colour(reached)))
+        self._notes.coordinates = coordinates  # a mean is the same wherever it is looked up
+        value = round(float(factor.mean[0]), 6)  # opaque to the bit, where it is
+        if factor.texture is not None and 0 < value < 1:
             self.say(f"{what}: by its mean, {value:.2f}, everywhere")
         return value
 
     def factor(self, reached, usual=0.5) -> Colour:
         """A number that a colour hangs on, which may vary over the surface; ``usual`` where it cannot be read."""
-        coordinates = list(self._coordinates)
         try:
             return grey(self.readable_colour(reached))
         except Unreadable as error:
-            self._coordinates = coordinates  # of images that nobody looks at
-            value = 0.0 if reached.node is not None and reached.node.type in BY_VIEW else usual
+            value = 0.0 if reached.node.type in BY_VIEW else usual
             self.say(f"its colour hangs on a {error}, which cannot be read: {value:g} is used for it")
             return Colour(np.full(3, value))
 
     def _colour(self, reached) -> Colour:
-        coordinates = list(self._coordinates)
         try:
             return self.readable_colour(reached)
         except Unreadable as error:
-            self._coordinates = coordinates  # of images that nobody looks at
             self.say(f"its {error} cannot be read: the viewport colour is used")
             return self._viewport_colour()
 
     def readable_colour(self, reached) -> Colour:
         """The colour that is reached; Unreadable where it, or a node that makes it, is not known."""
-        if reached.is_constant:
-            return Colour(_rgb(reached.socket.default_value))
-        if reached.node.type == "RGB":
-            return Colour(_rgb(reached.node.outputs[0].default_value))
-        if reached.node.type == "VALUE":
-            return Colour(np.full(3, constant(reached)))
+        key = (reached.socket.as_pointer(), *(group.as_pointer() for group in reached.groups))
+        if key not in self._read:
+            outer, self._notes = self._notes, Notes()
+            try:
+                self._read[key] = self._read_colour(reached), self._notes
+            except Unreadable as error:
+                self._read[key] = error, Notes()
+            finally:
+                self._notes = outer
+        found, notes = self._read[key]
+        self._notes.add(notes)
+        if isinstance(found, Unreadable):
+            raise found
+        return found
+
+    def _read_colour(self, reached) -> Colour:
+        if reached.is_constant or reached.node.type in {"RGB", "VALUE"}:
+            return Colour(constant_colour(reached))
         if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
         return read_colour_node(reached, self)
@@ -214,20 +237,15 @@ class MaterialReading:
         try:
             if reached.node.projection != "FLAT":
                 raise Unreadable(f"{reached.node.projection.lower()} projection")
-            self._coordinates.append(read_coordinates(follow(reached.node.inputs["Vector"], reached.groups)))
+            self._notes.coordinates[read_coordinates(follow(reached.node.inputs["Vector"], reached.groups))] = True
         except Unreadable as error:
             self.say(f"its image '{reached.node.image.name}' uses {error}: the image's mean colour is used")
             return Colour(colour.mean)
         return colour
 
     def _viewport_colour(self) -> Colour:
-        return Colour(np.clip(_rgb(self._material.diffuse_color), 0.0, 1.0))
+        return Colour(np.clip(np.array(self._material.diffuse_color[:3], float), 0.0, 1.0))
 
     def say(self, sentence):
-        """For the report, under the material's name."""
-        self._warn(f"material '{self._material.name}': {sentence}")
-
-
-def _rgb(value):
-    """A colour from a colour socket, or grey from a number."""
-    return np.array(value[:3], float) if hasattr(value, "__len__") else np.full(3, float(value))
+        """Note something for the report."""
+        self._notes.sentences[sentence] = True

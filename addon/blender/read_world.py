@@ -9,7 +9,7 @@ from ..core.environment import UNTURNED, Environment
 from ..core.scene import BRIGHTEST
 from .read_images import linear_pixels
 from .render_world import WorldError, rendered_world
-from .shader_nodes import Unreadable, constant, constant_vector, surface_shader
+from .shader_nodes import Unreadable, constant, constant_colour, constant_vector, surface_shader
 
 BLACK = (0.0, 0.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
@@ -53,12 +53,10 @@ def _rendered(world, depsgraph, unreadable, warn):
 
 def _colour(reached, warn):
     """A colour, and the environment that it multiplies or None."""
-    if reached.is_constant:
-        return reached.socket.default_value, None
-    if reached.node.type == "RGB":
-        return reached.node.outputs[0].default_value, None
     node = reached.node
-    if node.type != "TEX_ENVIRONMENT" or node.image is None or node.projection != "EQUIRECTANGULAR":
+    if node is None or node.type != "TEX_ENVIRONMENT":
+        return constant_colour(reached), None
+    if node.image is None or node.projection != "EQUIRECTANGULAR":
         raise Unreadable(f"{node.bl_label} node")
     turn = _turn(reached.feeding("Vector"))
     return WHITE, Environment(node.image.name, linear_pixels(node.image, warn), turn)

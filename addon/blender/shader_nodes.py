@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..core.emitters import LUMINANCE
+
 GROUP_DEPTH = 8  # a tree that nests deeper is not read; Blender forbids true recursion
 
 
@@ -61,12 +65,26 @@ def surface_shader(node_tree, output_type="OUTPUT_MATERIAL") -> Reached | None:
 
 
 def constant(reached: Reached) -> float:
-    """A number that does not vary over the surface."""
+    """A number that does not vary over the surface; of a colour, which a muted node may let through, its luminance."""
+    return float(constant_colour(reached) @ LUMINANCE) if _is_colour(reached) else float(_constant_value(reached))
+
+
+def constant_colour(reached: Reached) -> np.ndarray:
+    """A colour (3,) that does not vary over the surface; of a number, that grey."""
+    value = _constant_value(reached)
+    return np.array(value[:3], float) if _is_colour(reached) else np.full(3, float(value))
+
+
+def _constant_value(reached):
     if reached.is_constant:
-        return float(reached.socket.default_value)
-    if reached.node.type == "VALUE":
-        return float(reached.node.outputs[0].default_value)
-    raise Unreadable(f"{reached.socket.node.bl_label} node")
+        return reached.socket.default_value
+    if reached.node.type in {"VALUE", "RGB"}:
+        return reached.node.outputs[0].default_value
+    raise Unreadable(f"{reached.node.bl_label} node")
+
+
+def _is_colour(reached):
+    return hasattr(_constant_value(reached), "__len__")
 
 
 def constant_vector(mapping: Reached, name) -> tuple[float, float, float]:

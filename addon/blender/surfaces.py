@@ -7,9 +7,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core.scene import BRIGHTEST, Texture
-from .read_images import mean_colour
+from .read_images import mean_colour, shrunk
 
 BLACK = np.zeros(3)
+FINEST = 512  # texels a side
+
+
+@dataclass(frozen=True, slots=True)
+class Pixels:
+    """What nodes made of images, float32 (height, width, 3): of any size and sign, until a surface takes it."""
+
+    name: str
+    pixels: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +26,7 @@ class Colour:
     """A linear colour, times a texture where there is one."""
 
     value: np.ndarray
-    texture: Texture | None = None
+    texture: Texture | Pixels | None = None
 
     @property
     def is_black(self) -> bool:
@@ -31,14 +40,15 @@ class Colour:
     def scaled(self, factor) -> Colour:
         return Colour(self.value * factor, self.texture)
 
-    def within_one(self) -> Colour:
-        """Clipped to [0, 1]: a surface cannot reflect more than arrives."""
+    def within(self, most) -> Colour:
+        """Clipped to [0, most], as a surface can have it; a surface cannot reflect more than 1, all that arrives."""
         if self.texture is None:
-            return Colour(np.clip(self.value, 0.0, 1.0))
+            return Colour(np.clip(self.value, 0.0, most))
         pixels = self.texture.pixels
-        if pixels.min() >= 0 and (pixels.max(axis=(0, 1)) * self.value).max() <= 1 and self.value.min() >= 0:
+        is_possible = pixels.min() >= 0 and (pixels.max(axis=(0, 1)) * self.value).max() <= most
+        if isinstance(self.texture, Texture) and is_possible and self.value.min() >= 0:
             return self
-        clipped = np.clip(pixels * self.value, 0.0, 1.0).astype(np.float32)
+        clipped = np.clip(pixels * self.value, 0.0, most).astype(np.float32)
         return Colour(np.ones(3), Texture(self.texture.name, clipped))
 
 
@@ -73,25 +83,25 @@ def _sum_colours(colours) -> Colour:
 def pointwise(function, *colours) -> Colour:
     """What ``function`` of arrays (..., 3) makes of colours, at every texel of the largest of their textures.
 
-    What comes out below 0, which light cannot, is 0.
+    Of at most FINEST a side: light that bounces sees no finer ones, and materials may be many.
     """
     textures = {id(colour.texture): colour.texture for colour in colours if colour.texture is not None}
     if not textures:
-        return Colour(_possible(function(*(np.asarray(colour.value, np.float64) for colour in colours))))
-    shape = max((texture.pixels.shape for texture in textures.values()), key=lambda shape: shape[0] * shape[1])
-    pixels = _possible(function(*(_pixels_of(colour, shape) for colour in colours)))
-    name = " + ".join(texture.name for texture in textures.values())
-    return Colour(np.ones(3), Texture(name, pixels.astype(np.float32)))
+        return Colour(_finite(function(*(np.asarray(colour.value, np.float64) for colour in colours))))
+    small = {key: shrunk(texture.pixels, FINEST) for key, texture in textures.items()}
+    shape = max((pixels.shape for pixels in small.values()), key=lambda shape: shape[0] * shape[1])
+    arrays = [
+        np.broadcast_to(np.asarray(colour.value, np.float32), shape)
+        if colour.texture is None
+        else np.float32(colour.value) * _resampled(small[id(colour.texture)], shape)
+        for colour in colours
+    ]
+    name = ", ".join(dict.fromkeys(texture.name for texture in textures.values()))
+    return Colour(np.ones(3), Pixels(name, _finite(function(*arrays)).astype(np.float32)))
 
 
-def _possible(values):
-    return np.clip(np.nan_to_num(values, posinf=BRIGHTEST), 0.0, BRIGHTEST)
-
-
-def _pixels_of(colour, shape):
-    if colour.texture is None:
-        return np.broadcast_to(np.asarray(colour.value, np.float32), shape)
-    return np.float32(colour.value) * _resampled(colour.texture.pixels, shape)
+def _finite(values):
+    return np.clip(np.nan_to_num(values, posinf=BRIGHTEST, neginf=-BRIGHTEST), -BRIGHTEST, BRIGHTEST)
 
 
 def _resampled(pixels, shape):

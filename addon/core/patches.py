@@ -125,7 +125,7 @@ def cut(scene: Scene, kernel: KernelScene, grid: Grid, along, seed: int) -> Patc
 
 
 def laid_out(kernel: KernelScene, grid: Grid, along) -> Patches:
-    """The same that reflect nothing yet."""
+    """Patches of a grid as ``cut`` makes them, without their reflectance, which is 0."""
     first_pieces = _offsets(along**2)
     kernel.set_patches(grid.apexes, grid.first_rows, grid.first_cells, first_pieces.astype(np.int32))
     rows, columns = np.diff(grid.first_rows), np.diff(grid.first_cells)

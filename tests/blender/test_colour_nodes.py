@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import bpy
 import numpy as np
 import pytest
@@ -93,14 +95,36 @@ def test_a_mix_of_two_images(compare, blend):
     compare(mix, socket=2)
 
 
-def test_a_mix_by_an_image_is_clamped_where_it_says_so(compare):
+def halved(tree, node, socket=0):
+    """Half of what a node puts out: what lies above 1 shows, and whether it was clamped."""
+    half = tree.new("MixRGB")
+    half.blend_type = "MULTIPLY"
+    half.inputs[0].default_value, half.inputs[2].default_value = 1.0, (0.5, 0.5, 0.5, 1.0)
+    return tree.link(node, half, socket, 1)
+
+
+@pytest.mark.parametrize("is_clamped", [True, False])
+def test_a_mix_by_an_image_is_clamped_where_it_says_so(compare, is_clamped):
     def mix(tree, first, second):
         node = tree.new("Mix")
-        node.data_type, node.blend_type, node.clamp_result = "RGBA", "ADD", True
+        node.data_type, node.blend_type, node.clamp_result = "RGBA", "ADD", is_clamped
         node.inputs[6].default_value, node.inputs[7].default_value = (0.1, 0.5, 0.9, 1), (0.8, 0.2, 0.4, 1)
-        return tree.link(first, node, "Color", 0)
+        return halved(tree, tree.link(first, node, "Color", 0), 2)
 
-    compare(mix, socket=2, tolerance=LUMINANCE)
+    compare(mix, tolerance=LUMINANCE)
+
+
+@pytest.mark.parametrize("is_clamped", [True, False])
+def test_a_mix_of_numbers_by_a_factor_above_one(compare, is_clamped):
+    def mix(tree, first, second):
+        node = tree.new("Mix")
+        node.data_type, node.clamp_factor = "FLOAT", is_clamped
+        node.inputs[0].default_value, node.inputs[3].default_value = 1.5, 0.6
+        return tree.link(first, node, "Color", 2)
+
+    compare_or_flat = pytest.raises(AssertionError) if is_clamped else contextlib.nullcontext()
+    with compare_or_flat:  # clamped, the image has no share in it: one colour all over, which compare refuses
+        compare(mix, tolerance=2 * LUMINANCE)
 
 
 def test_a_mix_of_the_old_kind(compare):
@@ -147,6 +171,8 @@ def test_curves(compare):
         ("Gamma", {1: 0.4}, 0),
         ("Invert", {0: 0.75}, 1),
         ("BrightContrast", {1: 0.1, 2: 0.4}, 0),
+        ("BrightContrast", {1: -0.2, 2: 0.0}, 0),
+        ("BrightContrast", {1: 0.1, 2: -0.5}, 0),
         ("RGBToBW", {}, 0),
     ],
 )
@@ -160,15 +186,53 @@ def test_what_changes_a_colour(compare, kind, numbers, at):
     compare(node_of, tolerance=LUMINANCE if kind == "RGBToBW" else ROUNDING)
 
 
+def arithmetic(tree, operation, number, source, socket=0, is_clamped=False):
+    node = tree.new("Math")
+    node.operation, node.use_clamp = operation, is_clamped
+    node.inputs[1].default_value = number
+    return tree.link(source, node, socket, 0)
+
+
+@pytest.mark.parametrize("is_clamped", [True, False])
 @pytest.mark.parametrize("operation", ["ADD", "SUBTRACT", "MULTIPLY", "MINIMUM", "MAXIMUM", "DIVIDE", "POWER"])
-def test_arithmetic(compare, operation):
+def test_arithmetic(compare, operation, is_clamped):
     def node_of(tree, first, second):
-        node = tree.new("Math")
-        node.operation, node.use_clamp = operation, True
-        node.inputs[1].default_value = 0.6
-        return tree.link(first, node, "Color", 0)
+        return halved(tree, arithmetic(tree, operation, 0.6, first, "Color", is_clamped))
 
     compare(node_of, tolerance=LUMINANCE)
+
+
+def test_numbers_below_zero_count_until_the_end(compare):
+    def one_less_it(tree, first, second):
+        return arithmetic(tree, "ADD", 1.0, arithmetic(tree, "MULTIPLY", -1.0, first, "Color"))
+
+    compare(one_less_it, tolerance=LUMINANCE)
+
+
+def test_curves_go_on_beyond_one(compare):
+    def curves(tree, first, second):
+        node = tree.new("RGBCurve")
+        node.mapping.curves[3].points.new(0.5, 0.25)
+        node.mapping.update()
+        node.mapping.extend = "EXTRAPOLATED"
+        double = tree.new("MixRGB")
+        double.blend_type = "ADD"
+        double.inputs[0].default_value = 1.0
+        for k in (1, 2):
+            tree.link(first, double, "Color", k)
+        quarter = halved(tree, halved(tree, tree.link(double, node, 0, 1)))
+        return quarter
+
+    compare(curves, tolerance=1e-2)  # the last slope of two tables, carried on to twice their range
+
+
+def test_the_alpha_of_a_ramp(compare):
+    def ramp(tree, first, second):
+        node = tree.new("ValToRGB")
+        node.color_ramp.elements[0].color, node.color_ramp.elements[1].color = (1, 1, 1, 0.2), (0, 0, 0, 0.9)
+        return tree.link(first, node, "Color", 0)
+
+    compare(ramp, socket="Alpha", tolerance=TABLES)
 
 
 @pytest.mark.parametrize("kelvin", [1900, 2700, 4000, 6500, 9000, 20000])
@@ -257,3 +321,79 @@ def test_an_image_whose_alpha_is_one_is_opaque_without_a_word(nodes, add_image, 
     found, warnings = read_with_warnings(plane, material)
     assert found.transmittance == (0, 0, 0)
     assert warnings == ()
+
+
+def test_what_alpha_an_image_has_is_clamped_before_its_mean(nodes, add_image, plane):
+    """Texels of .5 and 0, times 4, let through none and all: half."""
+    pixels = np.array([[[0.5] * 3, [0.0] * 3]], np.float32)
+    material, tree = nodes()
+    alpha = arithmetic(tree, "MULTIPLY", 4.0, image_node(tree, add_image(pixels, is_float=True, space="Non-Color")))
+    tree.show(tree.link(alpha, tree.new("BsdfPrincipled"), 0, "Alpha"))
+    found, _ = read_with_warnings(plane, material)
+    assert found.transmittance == (0.5, 0.5, 0.5)
+
+
+def test_a_number_that_no_image_has_a_part_in_is_read_without_a_word(nodes, plane):
+    material, tree = nodes()
+    number = tree.new("Value")
+    number.outputs[0].default_value = 0.75
+    tree.show(tree.link(number, tree.new("BsdfPrincipled"), 0, "Alpha"))
+    found, warnings = read_with_warnings(plane, material)
+    assert found.transmittance == (0.25, 0.25, 0.25)
+    assert warnings == ()
+
+
+def test_what_a_muted_node_lets_through_is_a_number_where_one_is_asked_for(nodes, plane):
+    material, tree = nodes()
+    node = tree.new("HueSaturation", Color=(0.5, 0.5, 0.5, 1.0))
+    node.mute = True
+    tree.show(tree.link(node, tree.new("BsdfPrincipled"), 0, "Alpha"))
+    found, warnings = read_with_warnings(plane, material)
+    np.testing.assert_allclose(found.transmittance, 0.5, atol=1e-6)  # a mean is rounded so
+    assert warnings == ()
+
+
+def test_an_image_that_nobody_looks_at_moves_no_other(nodes, add_image, plane):
+    """A mask with a Mapping is multiplied by noise, which cannot be read: the base colour's image stays in place."""
+    material, tree = nodes()
+    mask = image_node(tree, add_image(colours(1), is_float=True, space="Non-Color"))
+    tree.link(
+        tree.link(tree.new("TexCoord"), tree.new("Mapping", Scale=(20, 20, 1)), "UV", "Vector"), mask, 0, "Vector"
+    )
+    dirt = arithmetic(tree, "MULTIPLY", 0.5, mask)
+    tree.link(tree.new("TexNoise"), dirt, 0, 1)
+    mix, diffuse = tree.new("MixShader"), tree.new("BsdfDiffuse")
+    base = image_node(tree, add_image(colours(0), is_float=True, space="Non-Color"))
+    tree.link(tree.link(base, diffuse, "Color", "Color"), mix, 0, 1)
+    tree.link(dirt, mix, 0, 0)
+    tree.show(mix)
+    plane.data.materials.append(material)
+    scene = read_scene(bpy.context.scene)
+    assert scene.uvs.max() == 1.0
+    assert not any("coordinates" in warning for warning in scene.warnings)
+
+
+def test_the_side_of_a_mix_that_has_no_share_need_not_be_readable(nodes, plane):
+    material, tree = nodes()
+    node = tree.new("Mix")
+    node.data_type = "RGBA"
+    node.inputs[0].default_value, node.inputs[6].default_value = 0.0, (0.25, 0.5, 0.75, 1)
+    tree.link(tree.new("TexNoise"), node, "Color", 7)
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), 2, "Color"))
+    found, warnings = read_with_warnings(plane, material)
+    assert found.reflectance == (0.25, 0.5, 0.75)
+    assert warnings == ()
+
+
+def test_a_node_that_is_used_twice_is_read_once(nodes, add_image, plane):
+    """Forty nodes, each taking the one before it twice: 2^40 readings if each use were one."""
+    material, tree = nodes()
+    last, socket = image_node(tree, add_image(colours(0))), 0
+    for _ in range(40):
+        node = tree.new("Mix")
+        node.data_type = "RGBA"
+        tree.link(last, node, socket, 6)
+        last, socket = tree.link(last, node, socket, 7), 2
+    tree.show(tree.link(last, tree.new("BsdfDiffuse"), 2, "Color"))
+    found, _ = read_with_warnings(plane, material)
+    assert found.reflectance_texture.pixels.shape == (SIDE, SIDE, 3)
