@@ -33,6 +33,7 @@ except ImportError:
 
 AIM = 0.01  # of p50, at which times are compared
 BOUNCES = 32
+FURTHEST = 100  # times the seconds of the last row: further than that no line through two rows is believed
 MARGIN = 4  # texels: bilinear lookup at a chart's border needs them
 
 
@@ -172,27 +173,32 @@ def seconds_at_aim(rows) -> float:
     return min(reached) if reached else best["seconds"] * (best["p50"] / AIM) ** 2
 
 
-def seconds_to_match(theirs, wanted) -> float:
-    """Time until p50 and p95 are both as good as in the row ``wanted``.
+def seconds_to_match(theirs, wanted) -> tuple[float, str]:
+    """Time until p50 and p95 are both as good as in the row ``wanted``, and how it is known.
 
     It is found on a line through the logarithms of two rows, those about it or else the last two; infinite where these
-    do not fall.
+    do not fall. Where the first row is as good, its time is the most that it may be.
     """
     return max(seconds_until(theirs, measure, wanted[measure]) for measure in ("p50", "p95"))
 
 
-def seconds_until(rows, measure, wanted) -> float:
+def seconds_until(rows, measure, wanted) -> tuple[float, str]:
     """The same for one measure."""
     rows = sorted(rows, key=lambda row: row["seconds"])
     if rows[0][measure] <= wanted:
-        return rows[0]["seconds"]
+        return rows[0]["seconds"], "at most"
     pairs = list(pairwise(rows))
-    before, after = next((pair for pair in pairs if pair[1][measure] <= wanted), pairs[-1])
+    between = next((pair for pair in pairs if pair[1][measure] <= wanted), None)
+    before, after = between or pairs[-1]
     fall = np.log(before[measure] / after[measure])
     if fall <= 0:
-        return np.inf
+        return np.inf, "by its rows never"
     share = np.log(before[measure] / wanted) / fall
-    return before["seconds"] * (after["seconds"] / before["seconds"]) ** share
+    seconds = before["seconds"] * (after["seconds"] / before["seconds"]) ** share
+    furthest = FURTHEST * rows[-1]["seconds"]
+    if seconds > furthest:
+        return furthest, "by its last two rows more than"
+    return seconds, "between its rows" if between else "by its last two rows"
 
 
 def print_table(rows) -> None:
@@ -216,9 +222,9 @@ def print_table(rows) -> None:
                 f"p50 = {AIM:g}: patchlight {here:.1f} s, {kind} {there:.0f} s (1 / sqrt(N)), {there / here:.0f} times"
             )
         for row in mine if len(theirs) > 1 else ():
-            there = seconds_to_match(theirs, row)
+            there, how = seconds_to_match(theirs, row)
             times = there / row["seconds"]
-            print(f"as good as {row['way']} in p50 and p95: {kind} {there:.0f} s (by its rows), {times:.0f} times")
+            print(f"as good as {row['way']} in p50 and p95: {kind} {how} {there:.0f} s, {times:.0f} times")
 
 
 if __name__ == "__main__":
