@@ -9,10 +9,13 @@ from .scene import Scene
 from .settings import BakeSettings
 
 EXCHANGE_TRIANGLES = 3000  # up to which "auto" takes conjugate gradients, which keep 4 n^2 bytes
-BRIGHT_ROOM = 0.8  # mean reflectance from which conjugate gradients need less time than stochastic Jacobi
+BRIGHT_ROOM = 0.8  # mean reflectance from which conjugate gradients need less time than stochastic Jacobi,
+BRIGHT_LIGHTMAP = 0.96  # and where texels mend what patches leave wrong: there rough patches do until then
 
 
-def choose(settings: BakeSettings, triangle_count: int, reflectance: float = 0.5) -> tuple[str, str, str]:
+def choose(
+    settings: BakeSettings, triangle_count: int, reflectance: float = 0.5, is_rough: bool = False
+) -> tuple[str, str, str]:
     """Solver, method, and a sentence on why, after "auto" has looked at the scene's size and mean reflectance.
 
     By time to equal error, measured on closed cubes and the Cornell box of 240 to 12000 sides: rows of form factors and
@@ -26,7 +29,7 @@ def choose(settings: BakeSettings, triangle_count: int, reflectance: float = 0.5
     if method == "hemicube":
         solver = "conjugate-gradient" if triangle_count <= EXCHANGE_TRIANGLES else "progressive"
         return solver, method, f"{solver} for {triangle_count} triangles, with form factors by hemicube as asked"
-    if reflectance >= BRIGHT_ROOM and triangle_count <= EXCHANGE_TRIANGLES:
+    if reflectance >= (BRIGHT_LIGHTMAP if is_rough else BRIGHT_ROOM) and triangle_count <= EXCHANGE_TRIANGLES:
         reason = f"{triangle_count} triangles of mean reflectance {reflectance:.2f}, where light bounces long"
         return "conjugate-gradient", method, f"conjugate-gradient for {reason}"
     return "stochastic", method, f"stochastic for {triangle_count} triangles: it needs no form factors, at any size"

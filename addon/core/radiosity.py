@@ -87,7 +87,7 @@ def _solved(
 ) -> tuple[Solved, Patches]:
     """The same without the laws, and the patches: those that a lightmap's texels mend are rough."""
     error = max(settings.error, LIGHTMAP_ERROR) if is_rough else settings.error
-    solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene))
+    solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene), is_rough)
 
     def measure(patches, on_step, known=None):
         return measure_patches(scene, kernel, patches, emitters, sky, error, settings.seed, known, on_step)

@@ -34,11 +34,19 @@ def test_every_solver_has_its_number_of_patches():
     assert set(PATCH_BUDGETS) == set(SOLVERS) - {"auto"}
 
 
-@pytest.mark.parametrize(("rho", "solver"), [(0.5, "stochastic"), (0.9, "conjugate-gradient")])
-def test_the_scene_decides(rho, solver):
-    """From triangles: a bright room and a grey one of the same shape."""
+@pytest.mark.parametrize(
+    ("target", "rho", "solver"),
+    [
+        ("vertex", 0.5, "stochastic"),
+        ("vertex", 0.9, "conjugate-gradient"),
+        ("lightmap", 0.9, "stochastic"),
+        ("lightmap", 0.98, "conjugate-gradient"),
+    ],
+)
+def test_the_scene_decides(target, rho, solver):
+    """From triangles: a bright room and a grey one of the same shape; a lightmap's texels mend rough patches."""
     scene = cube_room((LAMP,), material=Material("wall", (0.3, rho, 0.3)))
-    settings = BakeSettings(patch_size=0.5, error=0.2)
+    settings = BakeSettings(target=target, patch_size=0.5, error=0.2)
     with kernel_of(scene) as kernel:
         solved = solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), settings, lambda done: None)
     assert solved.solution.solver == solver
