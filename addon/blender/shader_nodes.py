@@ -66,13 +66,14 @@ def surface_shader(node_tree, output_type="OUTPUT_MATERIAL") -> Reached | None:
 
 def constant(reached: Reached) -> float:
     """A number that does not vary over the surface; of a colour, which a muted node may let through, its luminance."""
-    return float(constant_colour(reached) @ LUMINANCE) if _is_colour(reached) else float(_constant_value(reached))
+    value = _constant_value(reached)
+    return float(np.array(value[:3]) @ LUMINANCE) if hasattr(value, "__len__") else float(value)
 
 
 def constant_colour(reached: Reached) -> np.ndarray:
     """A colour (3,) that does not vary over the surface; of a number, that grey."""
     value = _constant_value(reached)
-    return np.array(value[:3], float) if _is_colour(reached) else np.full(3, float(value))
+    return np.array(value[:3], float) if hasattr(value, "__len__") else np.full(3, float(value))
 
 
 def _constant_value(reached):
@@ -81,10 +82,6 @@ def _constant_value(reached):
     if reached.node.type in {"VALUE", "RGB"}:
         return reached.node.outputs[0].default_value
     raise Unreadable(f"{reached.node.bl_label} node")
-
-
-def _is_colour(reached):
-    return hasattr(_constant_value(reached), "__len__")
 
 
 def constant_vector(mapping: Reached, name) -> tuple[float, float, float]:
