@@ -20,6 +20,7 @@ CORE_ORDER = (
     *("transport", "aimed", "hemicube", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
     *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides", "gather_sums"),
+    *("vertex_graph", "vertices"),
     *("patch_solution", "patch_light", "decomposition", "choose", "laws", "radiosity"),
     *("charts", "cut", "flatten", "packing", "unwrap", "texels", "gaps", "smoothing", "probes"),
     *(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 LIGHTMAP_LAYER = "Lightmap"
+FLAT_DEG = 2.0  # at the most do flat-shaded faces meet at, to be of one plane: they share light, as nothing parts them
 INFINITE = 1e15  # Blender stores an infinite coordinate as the largest float
 
 
@@ -118,9 +119,20 @@ def _next_corners(mesh):
 
 
 def _sharp_corner_edges(mesh, face_is_flat):
-    """Whether the edge from each corner to the next is sharp: marked so, or the side of a flat-shaded face."""
+    """Whether the edge from each corner to the next is sharp: marked so, or where a flat-shaded face bends off."""
     edges = _attribute(mesh, ".corner_edge", "value", np.int32, 1)
     is_sharp = _flags(mesh, "sharp_edge", len(mesh.edges))
     sizes = _read(mesh.polygons, "loop_total", np.int32, 1)
-    is_sharp[edges[np.repeat(face_is_flat, sizes)]] = True
+    normals = np.repeat(_read(mesh.polygon_normals, "vector", np.float32, 3), sizes, axis=0)
+    is_bent = _bent_edges(edges, normals, len(is_sharp))
+    of_flat = edges[np.repeat(face_is_flat, sizes)]
+    is_sharp[of_flat] |= is_bent[of_flat]
     return is_sharp[edges]
+
+
+def _bent_edges(edges, normals, count):
+    """Which of ``count`` edges have faces in different planes: edges (C,) and face normals (C, 3) of corners."""
+    faces = np.bincount(edges, minlength=count)
+    # two unit normals so far apart have a sum of twice the cosine of half of it
+    total = np.stack([np.bincount(edges, axis, count) for axis in normals.T], axis=1)
+    return np.linalg.norm(total, axis=1) < np.cos(np.radians(FLAT_DEG / 2)) * faces

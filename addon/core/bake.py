@@ -15,7 +15,7 @@ from .kernel import KernelScene
 from .lightmap import Lightmap, assemble
 from .probes import seen_through_corners, seen_through_lightmap
 from .radiosity import MOST_REFLECTANCE, UNSHOT_LIMIT, Solved, solve_radiosity
-from .receivers import surface_receivers, vertex_receivers
+from .receivers import surface_receivers
 from .report import Report
 from .scene import Scene, SceneError, radiance_from_exitance
 from .settings import BakeSettings
@@ -24,6 +24,7 @@ from .smoothing import texel_grid
 from .sound_faces import SoundFaces, sound_faces
 from .texels import texels
 from .unwrap import unwrap
+from .vertices import vertex_receivers
 from .workers import OnProgress, Progress, Workers
 
 # how a bake's time falls to its stages, for the progress bar
@@ -68,9 +69,8 @@ def bake(
             receivers, grid, seen = _on_texels(scene, settings, progress)
         else:
             progress.begin("texels")
-            receivers, corner_means = vertex_receivers(scene, settings.smooth_angle_deg)
-            grid = None
-            seen = seen_through_corners(scene, corner_means, settings.seed)
+            receivers, grid = vertex_receivers(scene, settings.smooth_angle_deg)
+            seen = seen_through_corners(scene, grid, settings.seed)
 
         progress.begin("solve")
         kernel = KernelScene(scene, workers)
@@ -90,8 +90,8 @@ def bake(
             lightmap = replace(lightmap, uvs=sound.spread(lightmap.uvs))
         else:
             corner_colours = np.full((len(scene.triangles), 3, 3), np.nan, np.float32)
-            colours = radiance_from_exitance(corner_means.corner_values(irradiance.values))
-            corner_colours[corner_means.triangles] = colours
+            colours = radiance_from_exitance(grid.corner_values(irradiance.values))
+            corner_colours[grid.triangles] = colours
             corner_colours = sound.spread(corner_colours)
         progress.end()
         denoiser = _denoiser_used(denoise, no_denoiser, irradiance, settings.error)

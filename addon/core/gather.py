@@ -18,8 +18,9 @@ from .probes import SeenPoints, rms_of
 from .radiosity import Solved
 from .receivers import Receivers
 from .relative import scale_of, scale_of_luminance
-from .smoothing import TexelGrid, blurred, pooled
+from .smoothing import TexelGrid
 from .texel_light import split_where_blocked, texel_light
+from .vertex_graph import VertexGraph
 from .workers import within
 
 LOOK_RAYS, TEXEL_LOOK_RAYS = 4, 1  # for a look at the light, which is blurred where there are texels
@@ -38,8 +39,8 @@ class Irradiance:
     Attributes
     ----------
     values : float32 (N, 3) E [W/m^2]
-    relative_error : estimated RMS of the error over (E + 0.3 median E), luminance: over receivers, of a lightmap by how
-        much of the surface looks each up
+    relative_error : estimated RMS of the error over (E + 0.3 median E), luminance: over what is stored, by how much
+        of the surface shows it
     seen_error : the same at random points of the surfaces, looked up in the result as a viewer does, and relative to
         the light that is there
     target_reached : whether sampling met its target
@@ -61,7 +62,7 @@ def gather_irradiance(
     kernel: KernelScene,
     solved: Solved,
     receivers: Receivers,
-    grid: TexelGrid | None,
+    grid: TexelGrid | VertexGraph,
     seen: SeenPoints,
     error: float,
     seed: int,
@@ -74,7 +75,7 @@ def gather_irradiance(
     Parameters
     ----------
     solved : the patches' reflected light, and what direct light is sampled from
-    grid : the texels that the receivers are, over which gathered light is smoothed; None = no smoothing
+    grid : the texels that the receivers are, or the vertices' values, over which gathered light is smoothed
     seen : random points of the surfaces, at which the result is looked up
     error : target of the relative error [1]
     denoise : a denoiser.Denoiser, or None
@@ -85,8 +86,7 @@ def gather_irradiance(
         nothing = {"direct": 0, "gather": 0, "probe": 0}
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
     started = time.perf_counter()
-    weights = grid.shown if grid else np.ones(len(receivers), np.float32)
-    job = GatherJob(kernel, solved, receivers, weights, no_guides(len(receivers)))
+    job = GatherJob(kernel, solved, receivers, grid.shown, no_guides(len(receivers)))
     job, direct, direct_rms, rays = _first_looks(job, grid, error, seed, within(on_step, 0.0, 0.4))
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     job = replace(job, guides=guides)
@@ -103,16 +103,16 @@ def gather_irradiance(
     return Irradiance(gathered.values, gathered.rms, seen_error, is_met, gathered.stopped, gathered.is_denoised, rays)
 
 
-def _first_looks(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
+def _first_looks(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed, on_step):
     """The job whose rays see about what is there, direct light (N, 3) and its relative error, and the rays of both."""
     direct, look, rays = _direct_and_look(job, grid, error, seed, within(on_step, 0.0, 0.875))
-    if grid is not None:
+    if grid.is_image:
         job, further = _with_texel_light(job, grid, direct.values, look, seed + 2, within(on_step, 0.875, 0.125))
         rays += further
-    return job, direct.values, direct.rms, {"direct": direct.rays, "gather": rays}
+    return job, grid.stored(direct.values), direct.rms, {"direct": direct.rays, "gather": rays}
 
 
-def _direct_and_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_step):
+def _direct_and_look(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed, on_step):
     """Direct light, what a few gather rays find (N, 3) and how many these were.
 
     Direct light comes in two parts, as how much noise it may have depends on what else there is.
@@ -122,12 +122,11 @@ def _direct_and_look(job: GatherJob, grid: TexelGrid | None, error, seed, on_ste
         return job.part(chosen).direct(samples, seed, on_step, is_first)
 
     def over_neighbours(of_one_ray):
-        return pooled(job.kernel.workers, grid, job.receivers, of_one_ray)
+        return grid.pooled(job.kernel.workers, job.receivers, of_one_ray)
 
     first = first_direct(trace, error, seed, within(on_step, 0.0, 0.25))
-    look, rays = job.glimpse(LOOK_RAYS if grid is None else TEXEL_LOOK_RAYS, seed + 2, within(on_step, 0.25, 0.25))
-    if grid is not None:
-        look = blurred(job.kernel.workers, grid, job.receivers, look)
+    look, rays = job.glimpse(TEXEL_LOOK_RAYS if grid.is_image else LOOK_RAYS, seed + 2, within(on_step, 0.25, 0.25))
+    look = grid.blurred(job.kernel.workers, job.receivers, look)
     scale = scale_of(first.values + look)
     rest = within(on_step, 0.5, 0.5)
     direct = refined_direct(first, trace, over_neighbours, scale, job.weights, error, seed, rest)
@@ -143,6 +142,6 @@ def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed, on_st
     rays, share = 0, 1 / (LOOKS - 1)
     for again in range(1, LOOKS):
         look, traced = job.glimpse(TEXEL_LOOK_RAYS, seed + 1000 * again, within(on_step, (again - 1) * share, share))
-        job.show(grid, direct, blurred(job.kernel.workers, grid, job.receivers, look))
+        job.show(grid, direct, grid.blurred(job.kernel.workers, job.receivers, look))
         rays += traced
     return job, rays

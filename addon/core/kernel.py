@@ -238,6 +238,22 @@ def clamp_outliers(workers, grid, receivers, values, variances):
     return out
 
 
+def smooth_graph(workers, graph, values, variances, stops_on_value):
+    """One round of edge-stopping smoothing: values float32 (V, 3), variances float32 (V,) of their luminance.
+
+    ``graph`` is a vertex_graph.VertexGraph; what the arguments mean: native/include/patchlight.h, pl_smooth_graph.
+    """
+    out_values, out_variances, edges = np.empty_like(values), np.empty_like(variances), graph.arrays()
+
+    def call(start, stop):
+        _kernel.smooth_graph(
+            *edges, values, variances, int(stops_on_value), start, stop - start, out_values, out_variances
+        )
+
+    workers.each_range(len(values), 1 << 16, call)
+    return out_values, out_variances
+
+
 def sobol_points(first, count, seed):
     """Points of a 4-D Owen-scrambled Sobol sequence, from number ``first`` on: float32 (count, 4) in [0, 1)."""
     out = np.empty((count, 4), np.float32)

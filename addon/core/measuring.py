@@ -7,13 +7,16 @@ import numpy as np
 from .direct_light import shadow_samples
 from .emitters import LUMINANCE
 from .gather_job import REPLICATES, GatherJob
-from .probes import Measured, Probes, chosen_receivers
+from .probes import Measured, Probes, chosen_values
 from .relative import scale_of
+from .smoothing import TexelGrid
+from .vertex_graph import VertexGraph
 
 DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain by; many of them average it out
 LEAST_RAYS, MOST_RAYS = 16, 1024  # of a replicate
 PILOT = 4  # of a probe's rays, one in so many tells whether it needs more,
 MORE_RAYS = 16  # times as many, where it is more uncertain than the error aimed at
+SHADOW, MORE_SHADOW = 4, 16  # times the shadow rays of a receiver, for all and for those that are as uncertain by them
 
 
 def rays_for(error: float) -> int:
@@ -21,10 +24,11 @@ def rays_for(error: float) -> int:
     return int(min(max(2 ** round(np.log2(1 / (REPLICATES * DOUBT * error**2))), LEAST_RAYS), MOST_RAYS))
 
 
-def probes_among(job: GatherJob, error, seed) -> Probes:
-    """Some of a job's receivers, measured."""
-    chosen = chosen_receivers(len(job.receivers))
-    return Probes(chosen, job.weights[chosen], measure(job.part(chosen), error, seed))
+def probes_among(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed) -> Probes:
+    """Some of the values that are made of a job's receivers, measured."""
+    members, starts, shares = grid.members(chosen_values(grid.value_count))
+    measured = measure(job.part(members), error, seed).merged(starts, shares)
+    return Probes(members[starts], job.weights[members[starts]], measured)
 
 
 def measure(job: GatherJob, error, seed) -> Measured:
@@ -32,15 +36,23 @@ def measure(job: GatherJob, error, seed) -> Measured:
 
     Where, a few rays of their own tell: those that happen to miss what is bright would take themselves to be certain.
     """
-    direct, variance, rays = job.direct(4 * shadow_samples(error), seed)
-    values, noise, count = direct.copy(), variance.copy(), rays_for(error)
-    pilot, spread, traced = job.gathered(max(count // PILOT, 1), seed)
-    quiet = np.sqrt(spread / PILOT) <= error * scale_of(direct + pilot)
-    rays += traced
+    shadow, count = shadow_samples(error), rays_for(error)
+    direct, direct_variance, rays = job.direct(shadow, seed)
+    gathered, variance, traced = job.gathered(max(count // PILOT, 1), seed)
+    doubtful = error * scale_of(direct + gathered)
     more = max(min(MORE_RAYS * count, MOST_RAYS), 2 * count)
-    for part, share, own in ((quiet, count, seed + 1), (~quiet, more, seed + 2)):
-        gathered, spread, traced = job.part(np.flatnonzero(part)).gathered(share, own)
-        values[part] += gathered
-        noise[part] += spread
+    by_direct = _in_parts(
+        job, GatherJob.direct, np.sqrt(direct_variance) > doubtful, (SHADOW * shadow, MORE_SHADOW * shadow), seed
+    )
+    by_gather = _in_parts(job, GatherJob.gathered, np.sqrt(variance / PILOT) > doubtful, (count, more), seed)
+    values, noise, further = (one + other for one, other in zip(by_direct, by_gather))
+    return Measured(values @ LUMINANCE, noise, rays + traced + further)
+
+
+def _in_parts(job: GatherJob, trace, is_noisy, counts, seed):
+    """What ``trace`` finds by few rays, and by more of them where that was found noisy: as it does."""
+    values, variance, rays = np.zeros((len(is_noisy), 3), np.float32), np.zeros(len(is_noisy), np.float32), 0
+    for part, count, own in ((~is_noisy, counts[0], seed + 1), (is_noisy, counts[1], seed + 2)):
+        values[part], variance[part], traced = trace(job.part(np.flatnonzero(part)), count, own)
         rays += traced
-    return Measured(values @ LUMINANCE, noise, rays)
+    return values, variance, rays

@@ -15,15 +15,16 @@ from .gather_sums import no_sums
 from .measuring import probes_among
 from .probes import Probes, rms_of
 from .relative import scale_of
-from .smoothing import TexelGrid, blurred, pooled, smoothed
+from .smoothing import TexelGrid
+from .vertex_graph import VertexGraph
 from .workers import within
 
 LEAST_FIRST, MOST_FIRST = 2, 8  # rays of a replicate in the first pass; few may miss what is bright and small, and
-MANY_TEXELS = 1 << 16  # not know it, but of so many texels neighbours vouch for each other: others begin with the most
+MANY = 1 << 16  # not know it, but of so many receivers neighbours vouch for each other: fewer begin with the most
 FIRST_ERROR = 0.1  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
 HURRY = 4  # such passes could be had in the time there is, at the least: else all begin with the fewest
 MOST_RAYS = 2048  # of a replicate; a last few that are not WORTH a pass are not taken
-MOST_COST = 15  # times what the fewest first rays cost may all passes, and FREE_RAYS at least,
+MOST_COST = 15  # times what the fewest first rays cost may all passes (vertices': of few), and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
@@ -104,7 +105,7 @@ class _Found:
 
 def gather_until(
     job: GatherJob,
-    grid: TexelGrid | None,
+    grid: TexelGrid | VertexGraph,
     direct,
     direct_rms: float,
     denoise: Callable | None,
@@ -127,10 +128,12 @@ def gather_until(
     """
     count, started = len(job.receivers), time.perf_counter()
     samples, probes = _Samples(count), None
-    fewest = LEAST_FIRST if grid and count >= MANY_TEXELS else MOST_FIRST
+    fewest = LEAST_FIRST if count >= MANY else MOST_FIRST
+    # vertices have fewer neighbours than texels, which take less off
+    budgeted = fewest if grid.is_image else MOST_FIRST
     first = first_rays(fewest, error, pace * seconds_left() / (REPLICATES * count))
     active, further = np.arange(count), np.full(count, first, np.int32)
-    aim = AIM if denoise is None or grid is None else DENOISED_AIM
+    aim = AIM if denoise is None or not grid.is_image else DENOISED_AIM
     budget, idle, begin, rms, is_first = 0, 0, 0.0, np.inf, True
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
@@ -138,9 +141,9 @@ def gather_until(
         samples.add(job, active, further, seed, within(on_step, begin, width))
         begin += width
         del active, further
-        budget = budget or ray_budget(samples.rays * fewest / first, error)
+        budget = budget or ray_budget(samples.rays * budgeted / first, error)
         scales = _show_what_was_gathered(job, grid, samples, direct)
-        probes = probes or probes_among(job, error, seed + 1)
+        probes = probes or probes_among(job, grid, error, seed + 1)
         found = _best_estimate(job, grid, samples, scales, direct, probes)
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
@@ -177,13 +180,12 @@ def ray_budget(fewest_cost, error) -> int:
 
 
 def _show_what_was_gathered(job: GatherJob, grid, samples: _Samples, direct):
-    """Let rays see it; what errors of it are relative to (N,), None where there is no grid."""
-    if grid is None:
-        return None
+    """Let rays see it where it is an image; what errors of it are relative to (N,)."""
     # blurred over neighbours only, which keeps the light there is: rays that see it average it anyway, while smoothing
     # that minds values would take some of a few rays' light away
-    near = blurred(job.kernel.workers, grid, job.receivers, samples.light)
-    job.show(grid, direct, near)
+    near = grid.blurred(job.kernel.workers, job.receivers, samples.light)
+    if grid.is_image:
+        job.show(grid, direct, near)
     return scale_of(near)
 
 
@@ -200,17 +202,17 @@ def _best_estimate(job: GatherJob, grid, samples: _Samples, scales, direct, prob
         relative = (np.sqrt(job.weights * noise) / scale_of(lit)).astype(np.float32)
         return _Found(lit, relative, probes.squares_of(lit))
 
-    as_it_is = rms_of(probes.squares_of(direct + samples.light))
-    if grid is not None:
-        smooth = found_by(*smoothed(workers, grid, receivers, samples.light, variance, scales, taken))
-        if smooth.rms < as_it_is:
-            return smooth
-    return found_by(samples.light, pooled(workers, None, receivers, variance * taken.astype(np.float32)) / taken)
+    as_it_is = rms_of(probes.squares_of(direct + grid.stored(samples.light)))
+    smooth = found_by(*grid.smoothed(workers, receivers, samples.light, variance, scales, taken))
+    if smooth.rms < as_it_is:
+        return smooth
+    noise = grid.pooled(workers, receivers, variance * taken.astype(np.float32)) / taken
+    return found_by(grid.stored(samples.light), noise)
 
 
 def _denoised(denoise, grid, found: _Found, samples: _Samples, direct, probes: Probes) -> _Found:
     """What the denoiser makes of it, where there is one and the probes find it better."""
-    if denoise is None or grid is None:
+    if denoise is None or not grid.is_image:
         return found
     values = denoised(denoise, grid, found.values, direct, samples.light, probes.receivers, probes.measured)
     other = replace(found, values=values, squares=probes.squares_of(values), is_denoised=True)

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .emitters import LUMINANCE
-from .receivers import CornerMeans, Receivers, surface_receivers
+from .receivers import Receivers, surface_receivers
 from .relative import scale_of
 from .scene import Scene
+from .vertex_graph import VertexGraph
 
 LEAST_PROBES, MOST_PROBES = 512, 2048
 PROBE_OF = 64  # receivers that one stands for, between these: measuring is not to take longer than baking
@@ -50,6 +51,11 @@ class Measured:
     variance: np.ndarray
     rays: int
 
+    def merged(self, starts, shares) -> Measured:
+        """Of runs of probes that begin at ``starts`` (K,), their means by shares (M,): (K,)."""
+        luminance = np.add.reduceat(shares * self.luminance, starts)
+        return Measured(luminance, np.add.reduceat(shares**2 * self.variance, starts), self.rays)
+
     def squares_of(self, values, scale):
         """Squared relative errors (M,) of irradiance (M, 3), without what the probes are uncertain by themselves."""
         # one wrong point counts as one, however wrong
@@ -59,11 +65,11 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class Probes:
-    """Some of the receivers, measured.
+    """Some of the values that are stored, measured.
 
     Attributes
     ----------
-    receivers : uint32 (K,) which
+    receivers : (K,) one of each
     weights : (K,) of their squared errors
     measured : what light they have
     """
@@ -93,8 +99,8 @@ def probe_count(receivers: int) -> int:
     return min(max(receivers // PROBE_OF, LEAST_PROBES), MOST_PROBES)
 
 
-def chosen_receivers(count: int):
-    """Receivers that are measured, evenly through ``count`` of them: uint32 (K,)."""
+def chosen_values(count: int):
+    """Values that are measured, evenly through ``count`` of them: uint32 (K,)."""
     return np.unique(np.linspace(0, count - 1, min(probe_count(count), count)).round().astype(np.uint32))
 
 
@@ -125,15 +131,15 @@ def seen_through_lightmap(scene: Scene, cells: np.ndarray, uvs: np.ndarray, seed
     return SeenPoints(receivers, lambda values: np.einsum("nk,nkc->nc", weights, values[indices]))
 
 
-def seen_through_corners(scene: Scene, means: CornerMeans, seed: int) -> SeenPoints:
+def seen_through_corners(scene: Scene, graph: VertexGraph, seed: int) -> SeenPoints:
     """Points between whose triangle's corners colours are interpolated."""
     is_coloured = np.zeros(len(scene.triangles), bool)
-    is_coloured[means.triangles] = True
-    triangles, barycentrics = _random_points(scene, is_coloured, probe_count(3 * len(means.triangles)), seed)
-    rows = np.searchsorted(means.triangles, triangles)
+    is_coloured[graph.triangles] = True
+    triangles, barycentrics = _random_points(scene, is_coloured, probe_count(3 * len(graph.triangles)), seed)
+    rows = np.searchsorted(graph.triangles, triangles)
     receivers = surface_receivers(scene, triangles, barycentrics)
     return SeenPoints(
-        receivers, lambda values: np.einsum("nk,nkc->nc", barycentrics, means.corner_values(values)[rows])
+        receivers, lambda values: np.einsum("nk,nkc->nc", barycentrics, graph.corner_values(values)[rows])
     )
 
 

@@ -7,6 +7,7 @@ the texels' own estimated noise.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,7 +25,6 @@ STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
 KEPT = 16  # texels to every side of each, over which smoothing is made to keep the light,
 MOST_KEPT = 0.5  # of what it left more or less, at the most
 BAND = 256  # rows of the grid at once
-POOL = 5  # receivers in a row that are neighbours, where there is no grid
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,11 +40,56 @@ class TexelGrid:
     shown : float32 (N,) how much of the surface looks each receiver up, relative to the mean
     """
 
+    is_image: ClassVar[bool] = True
     receivers: np.ndarray
     spacing: float
     uvs: np.ndarray
     reflectance: np.ndarray
     shown: np.ndarray
+
+    @property
+    def value_count(self) -> int:
+        """How many values are stored."""
+        return len(self.shown)
+
+    def stored(self, receiver_values):
+        """Values per receiver (N, C) as they are stored: each texel has its own."""
+        return receiver_values
+
+    def members(self, chosen):
+        """Receivers of chosen values (M,), where each value's start among them (M,), and their shares in it (M,)."""
+        return chosen, np.arange(len(chosen)), np.ones(len(chosen))
+
+    def blurred(self, workers: Workers, receivers: Receivers, values):
+        """Gathered light float32 (N, 3), averaged over the nearest texels of the same surface: float32 (N, 3)."""
+        return smooth(workers, self, receivers, values, np.zeros(len(values), np.float32), 1, False)[0]
+
+    def pooled(self, workers: Workers, receivers: Receivers, of_one_ray):
+        """Relative variances (N,) of one ray, averaged over the nearest receivers of the same surface: (N,).
+
+        A few replicates alone say little of one receiver's noise.
+        """
+        of_one_ray = np.minimum(of_one_ray, LARGEST_VARIANCE).astype(np.float32)
+        in_channels = np.repeat(of_one_ray[:, None], 3, axis=1)
+        return smooth(workers, self, receivers, in_channels, of_one_ray, 1, False)[0][:, 0]
+
+    def smoothed(self, workers: Workers, receivers: Receivers, values, variances, scales, taken):
+        """Gathered light (N, 3) smoothed by its variances (N,): values float32 (N, 3), variance of luminance (N,).
+
+        ``scales`` (N,) are those of the light ``blurred``, ``taken`` (N,) how many rays each is of. What is left
+        standing alone is clamped, which the variance does not tell.
+        """
+        # pooled relative to the light there, as the noise of what is bright says nothing of the calm beside it
+        relative = self.pooled(workers, receivers, variances / np.square(scales, dtype=np.float64) * taken) / taken
+        noise = np.minimum(relative * np.square(scales, dtype=np.float64), LARGEST_VARIANCE).astype(np.float32)
+        del relative
+        before, left = luminance_of(values), noise
+        for step in STEPS:
+            values, left = smooth(workers, self, receivers, values, left, step, True)
+        # by their own noise: pooled, what is far off by chance is as certain as its neighbours
+        values = clamp_outliers(workers, self, receivers, values, variances)
+        values *= restoring(self, before, luminance_of(values), np.sqrt(noise))[:, None]
+        return values, left
 
 
 def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Receivers) -> TexelGrid:
@@ -62,41 +107,6 @@ def _apart(rows, positions):
     left, right = positions[rows[:, :-1][beside]], positions[rows[:, 1:][beside]]
     apart = np.linalg.norm(right - left, axis=1).astype(np.float32)
     return apart[apart > 0]
-
-
-def blurred(workers: Workers, grid: TexelGrid, receivers: Receivers, values):
-    """Gathered light float32 (N, 3), averaged over the nearest texels of the same surface: float32 (N, 3)."""
-    return smooth(workers, grid, receivers, values, np.zeros(len(values), np.float32), 1, False)[0]
-
-
-def pooled(workers: Workers, grid: TexelGrid | None, receivers: Receivers, of_one_ray):
-    """Relative variances (N,) of one ray, averaged over the nearest receivers of the same surface: (N,).
-
-    A few replicates alone say little of one receiver's noise.
-    """
-    if grid is None:
-        return of_one_ray if len(of_one_ray) < POOL else np.convolve(of_one_ray, np.full(POOL, 1 / POOL), "same")
-    of_one_ray = np.minimum(of_one_ray, LARGEST_VARIANCE).astype(np.float32)
-    return smooth(workers, grid, receivers, np.repeat(of_one_ray[:, None], 3, axis=1), of_one_ray, 1, False)[0][:, 0]
-
-
-def smoothed(workers: Workers, grid: TexelGrid, receivers: Receivers, values, variances, scales, taken):
-    """Gathered light (N, 3) smoothed by its variances (N,): values float32 (N, 3), variance of luminance (N,).
-
-    ``scales`` (N,) are those of the light ``blurred``, ``taken`` (N,) how many rays each is of. What is left standing
-    alone is clamped, which the variance does not tell.
-    """
-    # pooled relative to the light there, as the noise of what is bright says nothing of the calm beside it
-    relative = pooled(workers, grid, receivers, variances / np.square(scales, dtype=np.float64) * taken) / taken
-    noise = np.minimum(relative * np.square(scales, dtype=np.float64), LARGEST_VARIANCE).astype(np.float32)
-    del relative
-    before, left = luminance_of(values), noise
-    for step in STEPS:
-        values, left = smooth(workers, grid, receivers, values, left, step, True)
-    # by their own noise: pooled, what is far off by chance is as certain as its neighbours
-    values = clamp_outliers(workers, grid, receivers, values, variances)
-    values *= restoring(grid, before, luminance_of(values), np.sqrt(noise))[:, None]
-    return values, left
 
 
 def restoring(grid: TexelGrid, before, luminance, deviations):

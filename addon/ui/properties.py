@@ -116,7 +116,10 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
     )
     smooth_angle: FloatProperty(
         name="Smooth Angle",
-        description="Faces that meet at a smaller angle share their vertex colors, unless the edge is marked sharp",
+        description=(
+            "Smooth-shaded faces that meet at a smaller angle share their vertex colors, unless the edge is marked "
+            "sharp; flat-shaded faces do where they lie in one plane"
+        ),
         default=radians(DEFAULTS.smooth_angle_deg),
         min=0.0,
         max=radians(180.0),

@@ -63,5 +63,6 @@ PyObject *door_gather(PyObject *self, PyObject *args);
 PyObject *door_direct(PyObject *self, PyObject *args);
 PyObject *door_smooth(PyObject *self, PyObject *args);
 PyObject *door_clamp_outliers(PyObject *self, PyObject *args);
+PyObject *door_smooth_graph(PyObject *self, PyObject *args);
 
 #endif

@@ -214,11 +214,11 @@ PyObject *door_direct(PyObject *self, PyObject *args) {
     return status == PL_OK ? PyLong_FromUnsignedLongLong(rays) : door_result(status);
 }
 
-/* Whether no index is `end` or more; below 0 is none. An exception names the array where one is. */
-static bool indices_are_below(const int32_t *indices, size_t count, size_t end, const char *name) {
+/* Whether all indices are `least` or more and below `end`; an exception names the array where one is not. */
+static bool indices_are_valid(const int32_t *indices, size_t count, int32_t least, size_t end, const char *name) {
     for (size_t i = 0; i < count; ++i) {
-        if (indices[i] >= 0 && (size_t)indices[i] >= end) {
-            PyErr_Format(PyExc_ValueError, "%s: %d is not below %zu", name, (int)indices[i], end);
+        if (indices[i] < least || (indices[i] >= 0 && (size_t)indices[i] >= end)) {
+            PyErr_Format(PyExc_ValueError, "%s: %d is no index below %zu", name, (int)indices[i], end);
             return false;
         }
     }
@@ -231,7 +231,7 @@ static Py_ssize_t grid_size(const pl_texel_grid *grid) {
 
 static bool grid_is_valid(const pl_texel_grid *grid, size_t receivers) {
     return grid->width >= 0 && grid->height >= 0 &&
-           indices_are_below(grid->receivers, (size_t)grid_size(grid), receivers, "grid");
+           indices_are_valid(grid->receivers, (size_t)grid_size(grid), INT32_MIN, receivers, "grid");
 }
 
 /* The grid that stands behind the receivers' arrays, some rows of which a call is for; else all are released. */
@@ -301,6 +301,55 @@ PyObject *door_clamp_outliers(PyObject *self, PyObject *args) {
     Py_BEGIN_ALLOW_THREADS
     status = pl_clamp_outliers(&grid, &receivers, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, first_row,
                                row_count, arrays[OUT_VALUES].view.buf);
+    Py_END_ALLOW_THREADS
+
+    door_release(arrays, ARRAYS);
+    return door_result(status);
+}
+
+/* Whether the edges of `count` values are runs, one after the other, of `edge_count` in all. */
+static bool runs_are_valid(const int32_t *first_edges, size_t count, size_t edge_count) {
+    bool is_valid = first_edges[0] == 0 && (size_t)first_edges[count] == edge_count;
+    for (size_t i = 0; is_valid && i < count; ++i)
+        is_valid = first_edges[i] <= first_edges[i + 1];
+    if (!is_valid)
+        PyErr_SetString(PyExc_ValueError, "first_edges: they are no runs of the neighbours");
+    return is_valid;
+}
+
+PyObject *door_smooth_graph(PyObject *self, PyObject *args) {
+    enum { FIRST_EDGES, NEIGHBOURS, NEARNESS, VALUES, VARIANCES, OUT_VALUES, OUT_VARIANCES, ARRAYS };
+    PyObject *objects[ARRAYS];
+    int stops_on_value;
+    Py_ssize_t first, count;
+    pl_status status;
+    (void)self;
+    if (!PyArg_ParseTuple(args, "OOOOOinnOO", &objects[FIRST_EDGES], &objects[NEIGHBOURS], &objects[NEARNESS],
+                          &objects[VALUES], &objects[VARIANCES], &stops_on_value, &first, &count, &objects[OUT_VALUES],
+                          &objects[OUT_VARIANCES]))
+        return NULL;
+    door_array arrays[] = {{"first_edges", 'i', 1, -1, false, {0}},
+                           {"neighbours", 'i', 1, -1, false, {0}},
+                           {"nearness", 'f', 1, AS_MANY_ROWS_AS(NEIGHBOURS), false, {0}},
+                           {"values", 'f', 3, -1, false, {0}},
+                           {"variances", 'f', 1, AS_MANY_ROWS_AS(VALUES), false, {0}},
+                           {"out_values", 'f', 3, AS_MANY_ROWS_AS(VALUES), true, {0}},
+                           {"out_variances", 'f', 1, AS_MANY_ROWS_AS(VALUES), true, {0}}};
+    if (!door_arrays(objects, arrays, ARRAYS))
+        return NULL;
+    const pl_vertex_graph graph = {arrays[FIRST_EDGES].view.buf, arrays[NEIGHBOURS].view.buf,
+                                   arrays[NEARNESS].view.buf};
+    const size_t size = door_rows(&arrays[VALUES]), edge_count = door_rows(&arrays[NEIGHBOURS]);
+    if (!door_has_numbers(&arrays[FIRST_EDGES], size + 1) || !runs_are_valid(graph.first_edges, size, edge_count) ||
+        !indices_are_valid(graph.neighbours, edge_count, 0, size, "neighbours") ||
+        !door_range_fits((uint64_t)first, (uint64_t)count, size)) {
+        door_release(arrays, ARRAYS);
+        return NULL;
+    }
+
+    Py_BEGIN_ALLOW_THREADS
+    status = pl_smooth_graph(&graph, arrays[VALUES].view.buf, arrays[VARIANCES].view.buf, stops_on_value, (size_t)first,
+                             (size_t)count, arrays[OUT_VALUES].view.buf, arrays[OUT_VARIANCES].view.buf);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, ARRAYS);

@@ -188,6 +188,9 @@ static PyMethodDef methods[] = {
      "row_count, out_values, out_variances)"},
     {"clamp_outliers", door_clamp_outliers, METH_VARARGS,
      "clamp_outliers(grid, width, height, spacing, receivers, values, variances, first_row, row_count, out_values)"},
+    {"smooth_graph", door_smooth_graph, METH_VARARGS,
+     "smooth_graph(first_edges, neighbours, nearness, values, variances, stops_on_value, first, count, out_values, "
+     "out_variances)"},
     {"rasterise_texels", rasterise_texels, METH_VARARGS,
      "rasterise_texels(uvs, width, height, out_triangles, out_distances, out_barycentrics)"},
     {"pack_charts", pack_charts, METH_VARARGS,

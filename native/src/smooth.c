@@ -7,18 +7,13 @@
  * The loops over a block vectorise, for which they choose between values and not what to compute.
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
+#include "edge_stops.h"
 #include "texel_rows.h"
 
 #include <math.h>
 
 enum { CHANNELS = 3 };
 static const float spline[TEXEL_RADIUS + 1] = {0.375f, 0.25f, 0.0625f}; /* B3 spline, from the middle out */
-
-/* (1 - x / 8)^8, about exp(-x), of which an expf would take most of the time here. */
-static inline float falling(float x) {
-    const float t = greater(1 - 0.125f * x, 0), square = t * t, fourth = square * square;
-    return fourth * fourth;
-}
 
 /* How far texels and their neighbours are samples of one smooth surface: 0 across creases, steps and charts. */
 static void weigh_surface(size_t stride, const float *restrict at, const float *restrict other, float reach_squared,
@@ -41,23 +36,11 @@ static void weigh_surface(size_t stride, const float *restrict at, const float *
     }
 }
 
-/*
- * How far two values are the same but for their noise. Each counts for a few times the other's at the most, or what is
- * bright and noisy (under a lamp that hangs off the ceiling) would spread over the calm texels beside it.
- */
-static const float noisier = 4;
-/* Less leaves mottles, more washes out what light does at contacts. */
-static const float tolerance = 7;
-
 static void weigh_values(size_t stride, const float *restrict at, const float *restrict other,
                          float *restrict io_weights) {
     for (size_t i = 0; i < TEXEL_BLOCK; ++i) {
         const float difference = at[LUMINANCE * stride + i] - other[LUMINANCE * stride + i];
-        const float va = at[VARIANCE * stride + i], vb = other[VARIANCE * stride + i];
-        const float noise = lesser(va, noisier * vb) + lesser(vb, noisier * va);
-        const float by_noise = falling(difference * difference / (tolerance * noise));
-        const float without_noise = difference == 0 ? 1.0f : 0.0f;
-        io_weights[i] *= noise > 0 ? by_noise : without_noise;
+        io_weights[i] *= alike(difference, at[VARIANCE * stride + i], other[VARIANCE * stride + i]);
     }
 }
 

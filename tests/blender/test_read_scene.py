@@ -119,8 +119,21 @@ def test_a_flat_face_is_sharp_on_both_sides_of_its_edges(add_mesh):
     is_shared = (np.sort(ends, axis=2) == (1, 2)).all(axis=2)
     assert is_shared.sum() == 2
     assert scene.objects[0].sharp_edges[is_shared].all()
-    # four sides of the flat quad, and the shared edge seen from its neighbour; no diagonal
-    assert scene.objects[0].sharp_edges.sum() == 5
+    # no diagonal, no border
+    assert scene.objects[0].sharp_edges.sum() == 2
+
+
+@pytest.mark.parametrize(("degrees", "is_sharp"), [(0, False), (1, False), (3, True), (180, True)])
+def test_flat_faces_of_one_plane_are_not_parted(add_mesh, degrees, is_sharp):
+    """Blender's meshes are flat-shaded unless told otherwise: a wall of many faces has no seams at each."""
+    x, z = 1 + np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    vertices = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (x, 0, z), (x, 1, z)]
+    pair = add_mesh("Pair", vertices, [(0, 1, 2, 3), (1, 4, 5, 2)])
+    pair.data.shade_flat()
+    sharp = read().objects[0].sharp_edges
+    assert sharp.sum() == (2 if is_sharp else 0)
+    pair.data.edges[[set(e.vertices) for e in pair.data.edges].index({1, 2})].use_edge_sharp = True
+    assert read().objects[0].sharp_edges.sum() == 2
 
 
 def test_a_face_with_no_normal_takes_its_triangles_own(add_mesh):

@@ -3,7 +3,8 @@
 import numpy as np
 
 from addon.core.direct_light import SHARE, first_direct, refined_direct
-from addon.core.smoothing import pooled
+from addon.core.workers import Workers
+from tests.graphs import row_graph
 
 COUNT = 4096
 LIGHT = 2.0
@@ -32,11 +33,13 @@ def run(deviation, error, scale=LIGHT, weights=1.0):
     assert told == [0.5, 1.0]
     told.clear()
 
-    def over_neighbours(noise):
-        return pooled(None, None, None, noise)
+    graph, ones = row_graph(COUNT, 2), np.ones(COUNT)
+    with Workers(1) as workers:
 
-    ones = np.ones(COUNT)
-    found = refined_direct(first, lamp, over_neighbours, scale * ones, weights * ones, error, 1, told.append)
+        def over_neighbours(noise):
+            return graph.pooled(workers, None, noise)
+
+        found = refined_direct(first, lamp, over_neighbours, scale * ones, weights * ones, error, 1, told.append)
     assert told == sorted(told)
     assert all(0 < done < 1 for done in told)
     return lamp, first, found

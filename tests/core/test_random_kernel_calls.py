@@ -325,6 +325,27 @@ def test_smoothing_of_any_grid(data):
         assert (result >= 0).all()
 
 
+@given(st.data())
+def test_smoothing_of_any_graph(data):
+    many, edges = data.draw(counts), data.draw(counts)
+    steps = arrays(data.draw, many, np.int32, st.integers(0, 3) | numbers)
+    first_edges = np.append(0, np.cumsum(steps, dtype=np.int64)).astype(np.int32)
+    edges = data.draw(st.sampled_from((edges, max(int(first_edges[-1]) % 100, 0))))
+    neighbours = arrays(data.draw, edges, np.int32, st.integers(0, max(many - 1, 0)) | numbers)
+    nearness = arrays(data.draw, edges, np.float32, st.sampled_from((0.0, 1.0, 1e-30)))
+    values = arrays(data.draw, (many, 3), np.float32, st.sampled_from((0.0, 1.0, 1e17)))
+    variances = arrays(data.draw, many, np.float32, st.sampled_from((0.0, 1.0, 1e34)))
+    out, out_variances = np.zeros((many, 3), np.float32), np.zeros(many, np.float32)
+    first, count = data.draw(numbers), data.draw(numbers)
+    try:
+        _kernel.smooth_graph(first_edges, neighbours, nearness, values, variances, 1, first, count, out, out_variances)
+    except REFUSALS:
+        return
+    # a mean of some is none of more than the most
+    assert (out >= 0).all()
+    assert (out <= 1.01 * max(values.max(initial=0), 0)).all()
+
+
 @given(kernel=kernels(), other=kernels())
 def test_patches_of_another_scene_are_refused(kernel, other):
     if kernel is None or other is None:

@@ -8,7 +8,7 @@ from addon.core.gather_sums import GatherSums
 from addon.core.kernel import clamp_outliers, smooth
 from addon.core.receivers import Receivers
 from addon.core.relative import scale_of
-from addon.core.smoothing import BAND, KEPT, MOST_KEPT, TexelGrid, _around, blurred, restoring, smoothed
+from addon.core.smoothing import BAND, KEPT, MOST_KEPT, TexelGrid, _around, restoring
 from addon.core.workers import Workers
 from tests.reference import smoothing as reference
 
@@ -51,9 +51,9 @@ def run(grid, receivers, means, taken=1):
     with Workers(2) as workers:
         sums = GatherSums(means.sum(axis=1), means @ LUMINANCE)
         values, variances = sums.means(1), sums.variances(1)
-        near = scale_of(blurred(workers, grid, receivers, values))
+        near = scale_of(grid.blurred(workers, receivers, values))
         taken = np.broadcast_to(taken, len(means))
-        return smoothed(workers, grid, receivers, values, variances, near, taken)
+        return grid.smoothed(workers, receivers, values, variances, near, taken)
 
 
 # the kernel takes 64 texels of a row at once, and ranges of 16 rows or more: one less, one more, several of each, and a
@@ -124,7 +124,7 @@ def test_a_blur_keeps_the_light_that_few_rays_found():
     # one ray in ten finds a lamp: what smoothing takes for noise is all the light there is
     found = 10.0 * (np.random.default_rng(4).random((SIDE * SIDE, 4, 1)) < 0.1) * np.ones(3)
     with Workers(2) as workers:
-        light = blurred(workers, grid, receivers, found.mean(axis=1).astype(np.float32))
+        light = grid.blurred(workers, receivers, found.mean(axis=1).astype(np.float32))
     # the means of neighbours have the mean of all; only at borders do some count for more
     assert light.mean() == pytest.approx(found.mean(), rel=0.01)
     assert light.std() < 0.5 * found.mean(axis=1).std()

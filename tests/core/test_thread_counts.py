@@ -8,9 +8,9 @@ from addon.core.emitters import emitters_of
 from addon.core.gather import gather_irradiance
 from addon.core.probes import SeenPoints
 from addon.core.radiosity import solve_radiosity
-from addon.core.receivers import vertex_receivers
 from addon.core.scene import AreaLight, Material
 from addon.core.settings import BakeSettings
+from addon.core.vertices import vertex_receivers
 from tests.scenes import box, kernel_of, rectangle, scene_of, sphere
 
 THREADS = (1, 2, 4)
@@ -44,10 +44,10 @@ def light_at(threads, method, solver):
     with kernel_of(scene, threads) as kernel:
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, settings, lambda done: None)
-        receivers, _ = vertex_receivers(scene, 30.0)
+        receivers, graph = vertex_receivers(scene, 30.0)
         seen = SeenPoints(receivers, lambda values: values)
         light = gather_irradiance(
-            kernel, solved, receivers, None, seen, 0.1, 0, None, lambda: np.inf, lambda done: None
+            kernel, solved, receivers, graph, seen, 0.1, 0, None, lambda: np.inf, lambda done: None
         )
     field = [np.ascontiguousarray(array).tobytes() for array in solved.patches.arrays()]
     return solved.solution.radiosity.tobytes(), field, light.values.tobytes(), {**solved.rays, **light.rays}

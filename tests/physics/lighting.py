@@ -8,6 +8,7 @@ from addon.core.probes import SeenPoints
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
 from addon.core.settings import BakeSettings
+from tests.graphs import row_graph
 from tests.scenes import BLACK, kernel_of, rectangle, scene_of
 
 # what float32 geometry of metres and the shift of some 1e-6 off the floor leave of an exact value
@@ -50,7 +51,7 @@ def full_light(scene, receivers, threads=2, grid=None, **settings):
             kernel=kernel,
             solved=solved,
             receivers=receivers,
-            grid=grid,
+            grid=grid or row_graph(len(receivers)),
             seen=SeenPoints(receivers, lambda values: values),
             error=settings.error,
             seed=settings.seed,

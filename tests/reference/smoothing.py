@@ -25,9 +25,7 @@ def smooth(grid, spacing, positions, normals, values, variances, step, stops_on_
                 reach = spacing * step * np.hypot(i - 2, j - 2)
                 weight *= _same_surface(positions[here], positions[there], normals[here], normals[there], reach)
                 if stops_on_value:
-                    noise = _common_noise(variances[here], variances[there])
-                    difference = (luminances[here] - luminances[there]) ** 2
-                    weight *= _falling(difference / (7 * noise)) if noise > 0 else float(difference == 0)
+                    weight *= _alike(luminances[here] - luminances[there], variances[here], variances[there])
             out[here] += weight * values[there]
             out_variances[here] += weight**2 * variances[there]
             total += weight
@@ -60,9 +58,10 @@ def _falling(x):
     return max(0.0, 1 - x / 8) ** 8
 
 
-def _common_noise(a, b):
-    """Variance of the difference, in which the noisier counts for at most four times the other."""
-    return min(a, 4 * b) + min(b, 4 * a)
+def _alike(difference, a, b):
+    """How far values of variances a and b are the same: of their noise the greater counts for four times the other."""
+    noise = min(a, 4 * b) + min(b, 4 * a)
+    return _falling(difference**2 / (7 * noise)) if noise > 0 else float(difference == 0)
 
 
 def _same_surface(p, q, n, m, reach):
@@ -70,3 +69,19 @@ def _same_surface(p, q, n, m, reach):
     if cosine < 0.9 or apart @ apart > 4 * reach**2:
         return 0.0
     return cosine**8 * _falling(8 * (apart @ n / reach) ** 2)
+
+
+def smooth_graph(neighbours, nearness, values, variances, stops_on_value):
+    """Means of values (V, 3) and those of their neighbours, lists of indices and of weights; and their variance."""
+    out, out_variances = np.zeros((len(values), 3)), np.zeros(len(values))
+    luminances = values @ LUMINANCE
+    for here in range(len(values)):
+        weights = {here: 1.0}
+        for there, weight in zip(neighbours[here], nearness[here]):
+            if stops_on_value:
+                weight *= _alike(luminances[here] - luminances[there], variances[here], variances[there])
+            weights[there] = weight
+        total = sum(weights.values())
+        out[here] = sum(weight * values[k] for k, weight in weights.items()) / total
+        out_variances[here] = sum(weight**2 * variances[k] for k, weight in weights.items()) / total**2
+    return out, out_variances

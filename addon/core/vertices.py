@@ -1,0 +1,79 @@
+"""What vertex colours are made of: receivers beside the corners of faces, and which of them share a colour."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .receivers import Receivers, surface_receivers
+from .scene import Scene
+from .vertex_graph import VertexGraph, vertex_graph
+
+INSET = 1 / 12  # of a triangle: a vertex is where surfaces touch, so its receivers stand a little inside their faces
+
+
+def vertex_receivers(scene: Scene, smooth_angle_deg: float) -> tuple[Receivers, VertexGraph]:
+    """A receiver inside every target face near each of its corners, and how they come together at vertices.
+
+    A vertex's value is the mean over the adjoining faces, by area and by nearness (Cohen & Greenberg 1985, sec. 5), of
+    what is gathered there; faces come together across edges that are not sharp where their corner normals differ by
+    less than the smooth angle.
+    """
+    spans = [np.arange(o.first, o.first + o.count) for o in scene.objects if o.is_target]
+    triangles = np.concatenate(spans).astype(np.int32) if spans else np.zeros(0, np.int32)
+    barycentrics = np.full((3, 3), INSET, np.float32)
+    np.fill_diagonal(barycentrics, 1 - 2 * INSET)
+    receivers = surface_receivers(scene, np.repeat(triangles, 3), np.tile(barycentrics, (len(triangles), 1)))
+
+    corners = scene.corners[triangles]
+    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    distances = np.linalg.norm(receivers.positions - corners.reshape(-1, 3), axis=1)
+    # a face without area must not make a mean without weight
+    areas = np.repeat(areas, 3) + 1e-12 * max(areas.max(initial=0.0), 1e-30)
+    owners, twins = _shared_corners(scene, triangles, smooth_angle_deg)
+    return receivers, vertex_graph(triangles, owners, areas / np.maximum(distances, 1e-12), areas, receivers, twins)
+
+
+def _shared_corners(scene, triangles, smooth_angle_deg):
+    """Number of the value that each corner of the triangles takes, int64 (3 K,); corners across edges (M, 2)."""
+    vertices = scene.triangles[triangles]
+    normals = scene.corner_normals[triangles].reshape(-1, 3)
+    sharp = np.zeros((len(triangles), 3), bool)
+    for obj in scene.objects:
+        if obj.is_target and obj.sharp_edges is not None:
+            sharp[np.searchsorted(triangles, obj.first) :][: obj.count] = obj.sharp_edges
+    first, second = _adjoining_edges(vertices)
+    across = ((first, _next_corner(second)), (_next_corner(first), second))
+    is_sharp, links = sharp.ravel()[first] | sharp.ravel()[second], []
+    for a, b in across:
+        is_smooth = np.einsum("nc,nc->n", normals[a], normals[b]) > np.cos(np.radians(smooth_angle_deg))
+        links.append(np.stack([a, b], axis=1)[is_smooth & ~is_sharp])
+    return _components(3 * len(triangles), np.concatenate(links)), np.concatenate([np.stack(p, 1) for p in across])
+
+
+def _next_corner(corner):
+    return corner - corner % 3 + (corner + 1) % 3
+
+
+def _adjoining_edges(vertices):
+    """Pairs of half edges (corner numbers 3 k + c) that run the same edge in opposite directions."""
+    start, end = vertices.ravel().astype(np.int64), np.roll(vertices, -1, axis=1).ravel().astype(np.int64)
+    count = int(vertices.max(initial=0)) + 1
+    keys, opposite = start * count + end, end * count + start
+    order = np.argsort(keys, kind="stable")
+    place = np.searchsorted(keys[order], opposite)
+    found = place < len(keys)
+    found[found] = keys[order][place[found]] == opposite[found]
+    return np.flatnonzero(found), order[place[found]]
+
+
+def _components(count, links):
+    """Connected components, int64 (count,), numbered from 0 in order of their first member."""
+    labels = np.arange(count)
+    while True:
+        before = labels.copy()
+        low = np.minimum(labels[links[:, 0]], labels[links[:, 1]])
+        np.minimum.at(labels, links[:, 0], low)
+        np.minimum.at(labels, links[:, 1], low)
+        labels = labels[labels]
+        if (labels == before).all():
+            return np.unique(labels, return_inverse=True)[1]

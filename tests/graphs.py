@@ -1,0 +1,24 @@
+"""Graphs of values for receivers that are no mesh's: alone, or neighbours of those beside them in a row."""
+
+import numpy as np
+
+from addon.core.vertex_graph import VertexGraph
+
+
+def row_graph(count, reach=0, nearness=1.0, owners=None):
+    """Each of ``count`` receivers a value (or as ``owners`` say), its neighbours those up to ``reach`` beside it."""
+    owners = np.arange(count) if owners is None else owners
+    sizes = np.bincount(owners)
+    values = len(sizes)
+    steps = np.setdiff1d(np.arange(-reach, reach + 1), [0])
+    around = np.arange(values)[:, None] + steps
+    is_there = (around >= 0) & (around < values)
+    return VertexGraph(
+        triangles=np.zeros(0, np.int32),
+        owners=owners,
+        shares=1 / sizes[owners],
+        first_edges=np.append(0, np.cumsum(is_there.sum(axis=1))).astype(np.int32),
+        neighbours=around[is_there].astype(np.int32),
+        nearness=np.full(is_there.sum(), nearness, np.float32),
+        shown=(count / max(values, 1) / sizes[owners]).astype(np.float32),
+    )
