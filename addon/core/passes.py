@@ -30,6 +30,7 @@ USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its squa
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
 AIM, DENOISED_AIM = 0.95, 1.03  # of the target: what receivers are due is an estimate, and a denoiser takes off some
+VERTEX_AIM = 0.85  # fewer neighbours take less off
 STEP = 0.85  # of gathered light's error, at the most, is aimed at: who is due hardly more than it has gets nothing
 LEAST_PART = 0.5  # of the error aimed at is left to gathered light, however noisy the direct light is
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
@@ -133,7 +134,7 @@ def gather_until(
     budgeted = fewest if grid.is_image else MOST_FIRST
     first = first_rays(fewest, error, pace * seconds_left() / (REPLICATES * count))
     active, further = np.arange(count), np.full(count, first, np.int32)
-    aim = AIM if denoise is None or not grid.is_image else DENOISED_AIM
+    aim = VERTEX_AIM if not grid.is_image else AIM if denoise is None else DENOISED_AIM
     budget, idle, begin, rms, is_first = 0, 0, 0.0, np.inf, True
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
@@ -147,7 +148,7 @@ def gather_until(
         found = _best_estimate(job, grid, samples, scales, direct, probes)
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
-            found, aim = _denoised(denoise, grid, found, samples, direct, probes), AIM
+            found, aim = _denoised(denoise, grid, found, samples, direct, probes), min(aim, AIM)
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
         if rms <= error and not is_first:

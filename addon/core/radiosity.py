@@ -36,6 +36,7 @@ ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where
 LIGHTMAP_ERROR = QUICK_ERROR  # at the least, is good enough for patches, and small ones are joined, where a lightmap
 MOST_AREA = 0.9  # has texels on so much of the scene: looks from one to the other mend the light, unless there are
 MANY_LIGHTS = 64  # or more (as in native/src/gather.c): where rays go on they take what patches have of these
+MOST_SHOT = 500_000  # sides get 8 rays each, at an error of 0.05; of more, gather rays see the mean of many
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it
@@ -170,7 +171,7 @@ def solve_patches(kernel, patches, emitted, solver, method, error, seed, on_step
     """Radiosity of all sides from what they emit, float64 (2 P, 3) [W/m^2], by a named solver and method."""
     areas, reflectance = patches.side_areas, np.minimum(patches.side_reflectance, MOST_REFLECTANCE)
     if solver == "stochastic":
-        rays = int(min(max(8 * len(emitted), 1 << 18) * (0.05 / error), 1 << 25))
+        rays = int(min(max(8 * min(len(emitted), MOST_SHOT), 1 << 18) * (0.05 / error), 1 << 25))
         return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, seed, on_step)
     estimator = form_factors(kernel, method, error, seed)
     if solver == "progressive":

@@ -71,9 +71,12 @@ class VertexGraph:
         return members, starts, self.shares[members]
 
     def pooled(self, workers: Workers, receivers: Receivers, of_one_ray):
-        """Relative variances (N,) of one ray -> those of the values if each receiver has one, of neighbours' mean."""
+        """Relative variances (N,) of one ray -> those of the values if each receiver has one, of neighbours' mean.
+
+        Over neighbours' neighbours, too: who is next to a penumbra has all or nothing of a lamp by chance.
+        """
         del receivers
-        return self._around(workers, self._variances(of_one_ray))[self.owners]
+        return self._around(workers, self._around(workers, self._variances(of_one_ray)))[self.owners]
 
     def blurred(self, workers: Workers, receivers: Receivers, values):
         """Gathered light float32 (N, 3), averaged over values and their neighbours: float32 (N, 3)."""
@@ -140,7 +143,8 @@ def _edges(owners, shares, receivers: Receivers, twins, count):
     sides = [corners[:, pair] for pair in ((0, 1), (1, 2), (2, 0))]
     pairs = np.concatenate([*sides, owners[twins]])
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    keys = np.unique(np.concatenate([pairs @ (count, 1), pairs @ (1, count)]))
+    first, second = pairs.T
+    keys = np.unique(np.concatenate([first * count + second, second * count + first]))
     here, there = np.divmod(keys, max(count, 1))
 
     def mean(arrays):

@@ -33,7 +33,7 @@ def run(deviation, error, scale=LIGHT, weights=1.0):
     assert told == [0.5, 1.0]
     told.clear()
 
-    graph, ones = row_graph(COUNT, 2), np.ones(COUNT)
+    graph, ones = row_graph(COUNT, 1), np.ones(COUNT)  # pooled twice: over five
     with Workers(1) as workers:
 
         def over_neighbours(noise):
