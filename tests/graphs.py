@@ -3,6 +3,8 @@
 import numpy as np
 
 from addon.core.vertex_graph import VertexGraph
+from addon.core.vertices import vertex_receivers
+from tests.scenes import kernel_of
 
 
 def row_graph(count, reach=0, nearness=1.0, owners=None):
@@ -22,3 +24,9 @@ def row_graph(count, reach=0, nearness=1.0, owners=None):
         nearness=np.full(is_there.sum(), nearness, np.float32),
         shown=(count / max(values, 1) / sizes[owners]).astype(np.float32),
     )
+
+
+def vertices_of(scene, angle=30.0):
+    """The receivers beside a scene's vertices, and their graph."""
+    with kernel_of(scene) as kernel:
+        return vertex_receivers(scene, kernel, angle)

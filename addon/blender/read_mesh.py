@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 LIGHTMAP_LAYER = "Lightmap"
-FLAT_DEG = 2.0  # at the most do flat-shaded faces meet at, to be of one plane: they share light, as nothing parts them
+FLAT_DEG = 2.0  # at the most do flat-shaded faces of one plane meet at, in the mesh's own space: nothing parts them
 INFINITE = 1e15  # Blender stores an infinite coordinate as the largest float
 
 

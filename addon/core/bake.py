@@ -67,13 +67,14 @@ def bake(
     ):
         if settings.target == "lightmap":
             receivers, grid, seen = _on_texels(scene, settings, progress)
+            kernel = KernelScene(scene, workers)
         else:
             progress.begin("texels")
-            receivers, grid = vertex_receivers(scene, settings.smooth_angle_deg)
+            kernel = KernelScene(scene, workers)
+            receivers, grid = vertex_receivers(scene, kernel, settings.smooth_angle_deg)
             seen = seen_through_corners(scene, grid, settings.seed)
 
         progress.begin("solve")
-        kernel = KernelScene(scene, workers)
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, settings, progress.step)
 

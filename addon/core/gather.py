@@ -23,7 +23,7 @@ from .texel_light import split_where_blocked, texel_light
 from .vertex_graph import VertexGraph
 from .workers import within
 
-LOOK_RAYS, TEXEL_LOOK_RAYS = 4, 1  # for a look at the light, which is blurred where there are texels
+LOOK_RAYS, TEXEL_LOOK_RAYS = 4, 1  # for a look at the light: it is blurred over neighbours, of which vertices have few
 LOOKS = 4  # the first sees the patches' light, each other what the one before it found on texels: patches straddle what
 # light does, and what they leave wrong falls by the reflectance from look to look
 NEAR = 10.0  # texels: rays that hit from nearer do not take a texel's light

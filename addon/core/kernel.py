@@ -250,7 +250,8 @@ def smooth_graph(workers, graph, values, variances, stops_on_value):
             *edges, values, variances, int(stops_on_value), start, stop - start, out_values, out_variances
         )
 
-    workers.each_range(len(values), 1 << 16, call)
+    # not many: each call looks at all edges, whether they lead somewhere
+    workers.each_range(len(values), max(1 << 16, len(values) // 16), call)
     return out_values, out_variances
 
 

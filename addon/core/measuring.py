@@ -28,7 +28,8 @@ def probes_among(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed) -> 
     """Some of the values that are made of a job's receivers, measured."""
     members, starts, shares = grid.members(chosen_values(grid.value_count))
     measured = measure(job.part(members), error, seed).merged(starts, shares)
-    return Probes(members[starts], job.weights[members[starts]], measured)
+    weights = np.add.reduceat(job.weights[members], starts) * (grid.value_count / len(job.receivers))
+    return Probes(members[starts], weights, job.weights[members[starts]] / np.maximum(weights, 1e-30), measured)
 
 
 def measure(job: GatherJob, error, seed) -> Measured:
@@ -39,12 +40,13 @@ def measure(job: GatherJob, error, seed) -> Measured:
     shadow, count = shadow_samples(error), rays_for(error)
     direct, direct_variance, rays = job.direct(shadow, seed)
     gathered, variance, traced = job.gathered(max(count // PILOT, 1), seed)
+    # what few shadow rays leave falls by more than half with the others: direct light is doubted early
     doubtful = error * scale_of(direct + gathered)
     more = max(min(MORE_RAYS * count, MOST_RAYS), 2 * count)
-    by_direct = _in_parts(
-        job, GatherJob.direct, np.sqrt(direct_variance) > doubtful, (SHADOW * shadow, MORE_SHADOW * shadow), seed
-    )
-    by_gather = _in_parts(job, GatherJob.gathered, np.sqrt(variance / PILOT) > doubtful, (count, more), seed)
+    samples, is_noisy = (SHADOW * shadow, MORE_SHADOW * shadow), np.sqrt(direct_variance) > doubtful
+    by_direct = _in_parts(job, lambda part, *how: part.direct(*how), is_noisy, samples, seed)
+    is_noisy = np.sqrt(variance / PILOT) > doubtful
+    by_gather = _in_parts(job, lambda part, *how: part.gathered(*how), is_noisy, (count, more), seed)
     values, noise, further = (one + other for one, other in zip(by_direct, by_gather))
     return Measured(values @ LUMINANCE, noise, rays + traced + further)
 

@@ -24,13 +24,15 @@ MANY = 1 << 16  # not know it, but of so many receivers neighbours vouch for eac
 FIRST_ERROR = 0.1  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
 HURRY = 4  # such passes could be had in the time there is, at the least: else all begin with the fewest
 MOST_RAYS = 2048  # of a replicate; a last few that are not WORTH a pass are not taken
-MOST_COST = 15  # times what the fewest first rays cost may all passes (vertices': of few), and FREE_RAYS at least,
+MOST_COST = (
+    15  # times what the fewest first rays cost may all passes, of vertices the most first rays, and FREE_RAYS at least,
+)
 FREE_RAYS = 1 << 26
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
 MOST_IDLE = 2  # the noise
 AIM, DENOISED_AIM = 0.95, 1.03  # of the target: what receivers are due is an estimate, and a denoiser takes off some
-VERTEX_AIM = 0.85  # fewer neighbours take less off
+VERTEX_AIM = 0.85  # they fall short by more where neighbours are few
 STEP = 0.85  # of gathered light's error, at the most, is aimed at: who is due hardly more than it has gets nothing
 LEAST_PART = 0.5  # of the error aimed at is left to gathered light, however noisy the direct light is
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
@@ -130,7 +132,7 @@ def gather_until(
     count, started = len(job.receivers), time.perf_counter()
     samples, probes = _Samples(count), None
     fewest = LEAST_FIRST if count >= MANY else MOST_FIRST
-    # vertices have fewer neighbours than texels, which take less off
+    # fewer neighbours take less off
     budgeted = fewest if grid.is_image else MOST_FIRST
     first = first_rays(fewest, error, pace * seconds_left() / (REPLICATES * count))
     active, further = np.arange(count), np.full(count, first, np.int32)
@@ -227,7 +229,7 @@ def _due(found: _Found, samples: _Samples, probes: Probes, error, aim, direct_rm
     """
     if found.rms <= error:
         return np.where(found.noise > SPECKLE * error, np.float32(np.inf), np.float32(0))
-    errors = measured_errors(found.noise, probes.receivers, found.squares)
+    errors = measured_errors(found.noise, probes.receivers, probes.shares * found.squares)
     errors, aimed_at = _gathered_part(errors, found.rms, aim * error, direct_rms)
     return np.minimum(rays_due(errors, samples.taken, aimed_at), MOST_RAYS).astype(np.float32)
 

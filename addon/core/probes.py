@@ -1,8 +1,8 @@
 """Probes: points where light is measured anew, with many more rays, to know how wrong a result is.
 
-Two kinds. Some of the receivers themselves: what noise and smoothing leave there is what more rays can mend. And
-random points of the surfaces, where the result is looked up as a viewer does: that is what an artist sees, texel size
-and all.
+Two kinds. Some of the values that are stored, of texels or vertices: what noise and smoothing leave there is what more
+rays can mend. And random points of the surfaces, where the result is looked up as a viewer does: that is what an
+artist sees, texel size and all.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .scene import Scene
 from .vertex_graph import VertexGraph
 
 LEAST_PROBES, MOST_PROBES = 512, 2048
-PROBE_OF = 64  # receivers that one stands for, between these: measuring is not to take longer than baking
+PROBE_OF = 64  # values that one stands for, between these: measuring is not to take longer than baking
 MOST_OF_OBJECT = 0.25  # of the seen points that lie on one object: a ground plane must not take all
 
 
@@ -69,13 +69,15 @@ class Probes:
 
     Attributes
     ----------
-    receivers : (K,) one of each
+    receivers : (K,) one receiver of each
     weights : (K,) of their squared errors
+    shares : (K,) of these, what is the one receiver's weight: 1 where each value has one
     measured : what light they have
     """
 
     receivers: np.ndarray
     weights: np.ndarray
+    shares: np.ndarray
     measured: Measured
 
     def squares_of(self, values):
@@ -94,9 +96,9 @@ def rms_of(squares) -> float:
     return float(np.sqrt(max(squares.mean(), squares.std() / len(squares) ** 0.5)))
 
 
-def probe_count(receivers: int) -> int:
-    """How many points are measured in a bake of so many receivers."""
-    return min(max(receivers // PROBE_OF, LEAST_PROBES), MOST_PROBES)
+def probe_count(values: int) -> int:
+    """How many points are measured in a bake of so many values."""
+    return min(max(values // PROBE_OF, LEAST_PROBES), MOST_PROBES)
 
 
 def chosen_values(count: int):
@@ -135,7 +137,7 @@ def seen_through_corners(scene: Scene, graph: VertexGraph, seed: int) -> SeenPoi
     """Points between whose triangle's corners colours are interpolated."""
     is_coloured = np.zeros(len(scene.triangles), bool)
     is_coloured[graph.triangles] = True
-    triangles, barycentrics = _random_points(scene, is_coloured, probe_count(3 * len(graph.triangles)), seed)
+    triangles, barycentrics = _random_points(scene, is_coloured, probe_count(graph.value_count), seed)
     rows = np.searchsorted(graph.triangles, triangles)
     receivers = surface_receivers(scene, triangles, barycentrics)
     return SeenPoints(

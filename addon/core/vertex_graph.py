@@ -76,7 +76,7 @@ class VertexGraph:
         Over neighbours' neighbours, too: who is next to a penumbra has all or nothing of a lamp by chance.
         """
         del receivers
-        return self._around(workers, self._around(workers, self._variances(of_one_ray)))[self.owners]
+        return self._pooled(workers, self._variances(of_one_ray), 2)[self.owners]
 
     def blurred(self, workers: Workers, receivers: Receivers, values):
         """Gathered light float32 (N, 3), averaged over values and their neighbours: float32 (N, 3)."""
@@ -93,7 +93,7 @@ class VertexGraph:
         scales = np.square(self._means(scales[:, None])[:, 0], dtype=np.float64)
         taken = self._means(taken[:, None])[:, 0]
         # pooled relative to the light there, as the noise of what is bright says nothing of the calm beside it
-        relative = self._around(workers, self._variances(variances) / scales * taken) / taken
+        relative = self._pooled(workers, self._variances(variances) / scales * taken, 1) / taken
         means, left = self._means(values), np.minimum(relative * scales, LARGEST_VARIANCE).astype(np.float32)
         for _ in range(ROUNDS):
             means, left = smooth_graph(workers, self, means, left, True)
@@ -109,13 +109,17 @@ class VertexGraph:
         """Of independent receivers (N,) -> of their means (V,)."""
         return np.bincount(self.owners, self.shares**2 * variances, self.value_count)
 
-    def _around(self, workers, variances):
-        """Variances (V,), averaged over neighbours."""
-        variances = np.minimum(variances, LARGEST_VARIANCE).astype(np.float32)
-        return smooth_graph(workers, self, np.repeat(variances[:, None], 3, axis=1), variances, False)[0][:, 0]
+    def _pooled(self, workers, variances, rounds):
+        """Variances of means (V,), averaged over neighbours as those of one receiver are, so many rounds."""
+        alone = self._variances(np.ones(len(self.owners)))
+        pooled = np.minimum(variances / alone, LARGEST_VARIANCE).astype(np.float32)
+        for _ in range(rounds):
+            in_channels = np.repeat(pooled[:, None], 3, axis=1)
+            pooled = smooth_graph(workers, self, in_channels, pooled, False)[0][:, 0].copy()
+        return pooled * alone
 
 
-def vertex_graph(triangles, owners, weights, areas, receivers: Receivers, twins) -> VertexGraph:
+def vertex_graph(triangles, owners, weights, areas, receivers: Receivers, pairs) -> VertexGraph:
     """The graph of triangles' corners.
 
     Parameters
@@ -125,11 +129,11 @@ def vertex_graph(triangles, owners, weights, areas, receivers: Receivers, twins)
     weights : (3 K,) of each corner in its value
     areas : (3 K,) of the corners' triangles
     receivers : (3 K,) beside the corners
-    twins : int64 (M, 2) corners that lie across an edge from one another
+    pairs : int64 (M, 2) corners that are neighbours
     """
     count = int(owners.max(initial=-1)) + 1
     shares = weights / np.bincount(owners, weights, count)[owners]
-    first_edges, neighbours, nearness = _edges(owners, shares, receivers, twins, count)
+    first_edges, neighbours, nearness = _edges(owners, shares, receivers, pairs, count)
     surface = np.bincount(owners, areas, count)
     shown = np.clip(surface / max(surface.sum() / max(count, 1), 1e-300), LEAST_SHOWN, MOST_SHOWN)
     shown = (shown / np.bincount(owners, minlength=count))[owners]
@@ -137,21 +141,20 @@ def vertex_graph(triangles, owners, weights, areas, receivers: Receivers, twins)
     return VertexGraph(triangles, owners, shares, first_edges, neighbours, nearness, shown.astype(np.float32))
 
 
-def _edges(owners, shares, receivers: Receivers, twins, count):
+def _edges(owners, shares, receivers: Receivers, pairs, count):
     """Runs of each value's edges, int32 (V + 1,), where they lead, int32 (E,), and what that counts, float32 (E,)."""
-    corners = owners.reshape(-1, 3)
-    sides = [corners[:, pair] for pair in ((0, 1), (1, 2), (2, 0))]
-    pairs = np.concatenate([*sides, owners[twins]])
+    pairs = owners[pairs]
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    first, second = pairs.T
-    keys = np.unique(np.concatenate([first * count + second, second * count + first]))
-    here, there = np.divmod(keys, max(count, 1))
+    low, high = np.divmod(np.unique(pairs.min(axis=1) * count + pairs.max(axis=1)), max(count, 1))
+    here, there = np.concatenate([low, high]), np.concatenate([high, low])
+    order = np.argsort(here, kind="stable")
+    here, there = here[order], there[order]
 
     def mean(arrays):
         return np.stack([np.bincount(owners, shares * axis, count) for axis in arrays.T], axis=1)
 
     positions, normals = mean(receivers.positions), mean(receivers.normals)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
     apart = positions[there] - positions[here]
     squared = np.einsum("nc,nc->n", apart, apart)
     weights = _of_one_surface(apart, squared, normals[here], normals[there])

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from .kernel import KernelScene
 from .receivers import Receivers, surface_receivers
 from .scene import Scene
 from .vertex_graph import VertexGraph, vertex_graph
 
 INSET = 1 / 12  # of a triangle: a vertex is where surfaces touch, so its receivers stand a little inside their faces
+LIFT = 0.1  # of their distance above their faces do two receivers look for each other
 
 
-def vertex_receivers(scene: Scene, smooth_angle_deg: float) -> tuple[Receivers, VertexGraph]:
+def vertex_receivers(scene: Scene, kernel: KernelScene, smooth_angle_deg: float) -> tuple[Receivers, VertexGraph]:
     """A receiver inside every target face near each of its corners, and how they come together at vertices.
 
     A vertex's value is the mean over the adjoining faces, by area and by nearness (Cohen & Greenberg 1985, sec. 5), of
     what is gathered there; faces come together across edges that are not sharp where their corner normals differ by
-    less than the smooth angle.
+    less than the smooth angle, and no wall stands between.
     """
     spans = [np.arange(o.first, o.first + o.count) for o in scene.objects if o.is_target]
     triangles = np.concatenate(spans).astype(np.int32) if spans else np.zeros(0, np.int32)
@@ -29,12 +31,16 @@ def vertex_receivers(scene: Scene, smooth_angle_deg: float) -> tuple[Receivers, 
     distances = np.linalg.norm(receivers.positions - corners.reshape(-1, 3), axis=1)
     # a face without area must not make a mean without weight
     areas = np.repeat(areas, 3) + 1e-12 * max(areas.max(initial=0.0), 1e-30)
-    owners, twins = _shared_corners(scene, triangles, smooth_angle_deg)
-    return receivers, vertex_graph(triangles, owners, areas / np.maximum(distances, 1e-12), areas, receivers, twins)
+    owners, twins = _shared_corners(scene, kernel, triangles, receivers, smooth_angle_deg)
+    corners = np.arange(3 * len(triangles))
+    sides = np.stack([corners, _next_corner(corners)], axis=1)
+    pairs = np.concatenate([sides[_see_each_other(kernel, receivers, sides)], twins])
+    return receivers, vertex_graph(triangles, owners, areas / np.maximum(distances, 1e-12), areas, receivers, pairs)
 
 
-def _shared_corners(scene, triangles, smooth_angle_deg):
-    """Number of the value that each corner of the triangles takes, int64 (3 K,); corners across edges (M, 2)."""
+def _shared_corners(scene, kernel, triangles, receivers, smooth_angle_deg):
+    """Number of the value that each corner of the triangles takes, int64 (3 K,); which see each other across edges
+    (M, 2)."""
     vertices = scene.triangles[triangles]
     normals = scene.corner_normals[triangles].reshape(-1, 3)
     sharp = np.zeros((len(triangles), 3), bool)
@@ -42,12 +48,23 @@ def _shared_corners(scene, triangles, smooth_angle_deg):
         if obj.is_target and obj.sharp_edges is not None:
             sharp[np.searchsorted(triangles, obj.first) :][: obj.count] = obj.sharp_edges
     first, second = _adjoining_edges(vertices)
-    across = ((first, _next_corner(second)), (_next_corner(first), second))
-    is_sharp, links = sharp.ravel()[first] | sharp.ravel()[second], []
-    for a, b in across:
-        is_smooth = np.einsum("nc,nc->n", normals[a], normals[b]) > np.cos(np.radians(smooth_angle_deg))
-        links.append(np.stack([a, b], axis=1)[is_smooth & ~is_sharp])
-    return _components(3 * len(triangles), np.concatenate(links)), np.concatenate([np.stack(p, 1) for p in across])
+    is_sharp = sharp.ravel()[first] | sharp.ravel()[second]
+    ends = [np.stack(pair, axis=1) for pair in ((first, _next_corner(second)), (_next_corner(first), second))]
+    twins, is_sharp = np.concatenate(ends), np.tile(is_sharp, 2)
+    seen = _see_each_other(kernel, receivers, twins)
+    twins, is_sharp = twins[seen], is_sharp[seen]
+    cosines = np.einsum("nc,nc->n", normals[twins[:, 0]], normals[twins[:, 1]])
+    is_shared = ~is_sharp & (cosines > np.cos(np.radians(smooth_angle_deg)))
+    return _components(3 * len(triangles), twins[is_shared]), twins
+
+
+def _see_each_other(kernel, receivers, pairs):
+    """Whether nothing stands between receivers (M, 2), a little above their faces: bool (M,)."""
+    start, end = (receivers.positions[column] for column in pairs.T)
+    lift = LIFT * np.linalg.norm(end - start, axis=1, keepdims=True)
+    start += lift * receivers.normals[pairs[:, 0]]
+    end += lift * receivers.normals[pairs[:, 1]]
+    return ~kernel.occluded(start, end)
 
 
 def _next_corner(corner):
@@ -63,7 +80,10 @@ def _adjoining_edges(vertices):
     place = np.searchsorted(keys[order], opposite)
     found = place < len(keys)
     found[found] = keys[order][place[found]] == opposite[found]
-    return np.flatnonzero(found), order[place[found]]
+    first, second = np.flatnonzero(found), order[place[found]]
+    # each is found from both sides
+    once = first < second
+    return first[once], second[once]
 
 
 def _components(count, links):

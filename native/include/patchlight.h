@@ -418,14 +418,16 @@ pl_status pl_clamp_outliers(const pl_texel_grid *grid, const pl_receivers *recei
  * One round of edge-stopping smoothing over the vertices of meshes: each value becomes the mean of itself, with weight
  * 1, and its neighbours.
  *
- *   graph           neighbours of value i: neighbours[first_edges[i]] .. neighbours[first_edges[i + 1] - 1], and how
- * much each counts by where it is values          3 per value of the graph variances       1 per value, of their
- * luminance stops_on_value  as of pl_smooth first, count    the range of values out_values, out_variances  at the
- * values' indices; the variance of the weighted mean
+ *   graph           value i has the neighbours of edges first_edges[i] .. first_edges[i + 1] - 1
+ *   values          3 per value of the graph
+ *   variances       1 per value, of their luminance
+ *   stops_on_value  as of pl_smooth
+ *   first, count    the range of values
+ *   out_values, out_variances  at the values' indices, not in place; the variance of the weighted mean
  */
 typedef struct pl_vertex_graph {
     const int32_t *first_edges, *neighbours;
-    const float *nearness;
+    const float *nearness; /* 1 per edge: what the neighbour counts by where it is */
 } pl_vertex_graph;
 pl_status pl_smooth_graph(const pl_vertex_graph *graph, const float *values, const float *variances,
                           int32_t stops_on_value, size_t first, size_t count, float *out_values, float *out_variances);

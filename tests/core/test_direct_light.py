@@ -33,7 +33,7 @@ def run(deviation, error, scale=LIGHT, weights=1.0):
     assert told == [0.5, 1.0]
     told.clear()
 
-    graph, ones = row_graph(COUNT, 1), np.ones(COUNT)  # pooled twice: over five
+    graph, ones = row_graph(COUNT, 1), np.ones(COUNT)  # pooled twice: over five, as good as four
     with Workers(1) as workers:
 
         def over_neighbours(noise):
@@ -54,7 +54,7 @@ def test_noise_comes_to_its_share_of_the_error_and_not_by_more_rays_than_that_ta
     error = 0.05
     _, first, found = run(penumbra(), error)
     before, after = (np.sqrt(np.mean((light.values[:, 0] / LIGHT - 1) ** 2)) for light in (first, found))
-    # half the receivers, 2048 of them, each a chi square: the RMS is known to 2 %, pooled noise of ten to some more
+    # half the receivers, 2048 of them, each a chi square: the RMS is known to 2 %, pooled noise of nine to some more
     assert before > 2 * SHARE * error
     assert 0.5 * SHARE * error < after < 1.1 * SHARE * error
 

@@ -59,7 +59,9 @@ def next_of(errors, rays_left=1e12, rays_in_time=np.inf, aim=AIM, taken=8, error
     # those that are measured have one error, so that it is known
     rms = float(np.sqrt(np.mean(errors**2))) if error_found is None else error_found
     found = _Found(np.zeros((COUNT, 3)), errors, np.full(len(chosen), rms**2))
-    probes = Probes(chosen, np.ones(len(chosen)), Measured(np.zeros(len(chosen)), np.zeros(len(chosen)), 0))
+    probes = Probes(
+        chosen, np.ones(len(chosen)), np.ones(len(chosen)), Measured(np.zeros(len(chosen)), np.zeros(len(chosen)), 0)
+    )
     due = _due(found, samples, probes, 0.02, aim, 0.0)
     return samples, *_next(due, samples, rms <= 0.02, rays_left, rays_in_time)
 

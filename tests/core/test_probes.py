@@ -15,7 +15,7 @@ from addon.core.relative import scale_of
 from addon.core.settings import BakeSettings
 from addon.core.texels import texels
 from addon.core.unwrap import unwrap
-from addon.core.vertices import vertex_receivers
+from tests.graphs import vertices_of
 from tests.scenes import closed_box, rectangle, scene_of
 
 
@@ -44,7 +44,7 @@ def test_a_lightmap_shows_a_linear_field_as_it_is():
 
 def test_corner_colours_show_a_linear_field_about_as_it_is():
     scene = closed_box()
-    receivers, graph = vertex_receivers(scene, 30.0)
+    receivers, graph = vertices_of(scene)
     seen = seen_through_corners(scene, graph, 1)
     shown = seen.look_up(smooth_field(receivers.positions))
     # a receiver stands a sixth of an edge inside its face
@@ -56,7 +56,7 @@ def test_a_ground_plane_does_not_take_all_points():
     table = rectangle((0, 0, 1), (1, 0, 0), (0, 1, 0), name="table")
     chair = rectangle((2, 0, 1), (1, 0, 0), (0, 1, 0), name="chair")
     scene = scene_of([ground, table, chair])
-    _, graph = vertex_receivers(scene, 30.0)
+    _, graph = vertices_of(scene)
     points = seen_through_corners(scene, graph, 1).receivers
     on_ground = np.mean(points.positions[:, 2] == 0)
     # the ground's weight is a quarter of the whole area, so all but 1 / 1250 of what is chosen from

@@ -7,7 +7,7 @@ import pytest
 
 from addon.core.patches import subdivide
 from addon.core.receivers import patch_receivers, surface_receivers
-from addon.core.vertices import vertex_receivers
+from tests.graphs import vertices_of
 from tests.scenes import Part, box, closed_box, kernel_of, moved, rectangle, scene_of, sphere
 
 
@@ -86,7 +86,7 @@ def test_patch_receivers_lie_in_the_plane_of_their_triangle_wherever_the_scene_s
 
 def shared_vertices(scene, angle=30.0):
     """For each corner of the scene, the set of triangles whose corners share its value."""
-    _, graph = vertex_receivers(scene, angle)
+    _, graph = vertices_of(scene, angle)
     owner = np.repeat(graph.triangles, 3)
     return [frozenset(owner[graph.owners == value].tolist()) for value in graph.owners]
 
@@ -125,7 +125,7 @@ def test_objects_that_only_touch_do_not_share():
 
 def test_only_targets_have_vertex_receivers():
     plates = [rectangle((0, 0, z), (1, 0, 0), (0, 1, 0), is_target=z == 1) for z in (0, 1, 2)]
-    receivers, graph = vertex_receivers(scene_of(plates), 30.0)
+    receivers, graph = vertices_of(scene_of(plates))
     assert graph.triangles.tolist() == [2, 3]
     assert len(receivers) == 6
     assert (receivers.positions[:, 2] == 1).all()
@@ -134,7 +134,7 @@ def test_only_targets_have_vertex_receivers():
 def test_a_constant_comes_through_the_means_as_it_is():
     degenerate = Part([(0, 0, 0), (1, 1, 1), (2, 2, 2)], [(0, 1, 2)])
     scene = scene_of([sphere((0, 0, 0), 1), degenerate])
-    receivers, graph = vertex_receivers(scene, 30.0)
+    receivers, graph = vertices_of(scene)
     values = graph.corner_values(np.full((len(receivers), 3), 7.0))
     assert values.shape == (len(scene.triangles), 3, 3)
     # weights over their sum; a face without area has a mean, too
@@ -144,7 +144,7 @@ def test_a_constant_comes_through_the_means_as_it_is():
 def test_a_value_is_the_mean_of_the_receivers_near_its_vertex():
     """A linear function of position on a flat sheet: each vertex gets its value within what receivers are inset."""
     scene = scene_of([rectangle((0, 0, 0), (4, 0, 0), (0, 4, 0), cuts=(4, 4))])
-    receivers, graph = vertex_receivers(scene, 30.0)
+    receivers, graph = vertices_of(scene)
     values = graph.corner_values(receivers.positions)
     off = np.linalg.norm(values - scene.corners, axis=2)
     # receivers stand a sixth of a 1 m cell's way towards the middle of their triangle

@@ -44,7 +44,7 @@ def light_at(threads, method, solver):
     with kernel_of(scene, threads) as kernel:
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, settings, lambda done: None)
-        receivers, graph = vertex_receivers(scene, 30.0)
+        receivers, graph = vertex_receivers(scene, kernel, 30.0)
         seen = SeenPoints(receivers, lambda values: values)
         light = gather_irradiance(
             kernel, solved, receivers, graph, seen, 0.1, 0, None, lambda: np.inf, lambda done: None
