@@ -83,9 +83,8 @@ def test_texels_that_nobody_looks_up_get_no_further_rays():
     is_seen = receivers.positions[:, 0] > np.median(receivers.positions[:, 0])
     half = replace(grid, shown=(2 * np.where(is_seen, 1 - 1e-6, 1e-6)).astype(np.float32))
     whole, part = (light_of(scene, receivers, error=0.02, grid=which)[0] for which in (grid, half))
-    # of the half, the last receivers' passes would be too small to be worth it
     assert whole.target_reached
-    assert part.target_reached or part.stopped == "by the budget of rays" or part.relative_error <= 1.1 * 0.02
+    assert part.target_reached or part.stopped == "as further rays no longer help"
     # the first pass is everyone's, and the mean of the half is over half as many: its own rays stay about the same
     assert part.rays["gather"] < 0.8 * whole.rays["gather"]
 
