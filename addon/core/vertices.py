@@ -10,7 +10,7 @@ from .scene import Scene
 from .vertex_graph import VertexGraph, vertex_graph
 
 INSET = 1 / 12  # of a triangle: a vertex is where surfaces touch, so its receivers stand a little inside their faces
-LIFT = 0.1  # of their distance above their faces do two receivers look for each other
+LIFT = 0.1  # of their distance above their faces do two receivers look for each other, and over the edge between them
 
 
 def vertex_receivers(scene: Scene, kernel: KernelScene, smooth_angle_deg: float) -> tuple[Receivers, VertexGraph]:
@@ -27,18 +27,20 @@ def vertex_receivers(scene: Scene, kernel: KernelScene, smooth_angle_deg: float)
     receivers = surface_receivers(scene, np.repeat(triangles, 3), np.tile(barycentrics, (len(triangles), 1)))
 
     corners = scene.corners[triangles]
-    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1)
+    areas, normals = 0.5 * lengths, normals / np.maximum(lengths, 1e-300)[:, None]
     distances = np.linalg.norm(receivers.positions - corners.reshape(-1, 3), axis=1)
     # a face without area must not make a mean without weight
     areas = np.repeat(areas, 3) + 1e-12 * max(areas.max(initial=0.0), 1e-30)
-    owners, twins = _shared_corners(scene, kernel, triangles, receivers, smooth_angle_deg)
+    owners, twins = _shared_corners(scene, kernel, triangles, receivers, normals, smooth_angle_deg)
     corners = np.arange(3 * len(triangles))
     sides = np.stack([corners, _next_corner(corners)], axis=1)
-    pairs = np.concatenate([sides[_see_each_other(kernel, receivers, sides)], twins])
+    pairs = np.concatenate([sides[_see_each_other(kernel, receivers, normals, sides)], twins])
     return receivers, vertex_graph(triangles, owners, areas / np.maximum(distances, 1e-12), areas, receivers, pairs)
 
 
-def _shared_corners(scene, kernel, triangles, receivers, smooth_angle_deg):
+def _shared_corners(scene, kernel, triangles, receivers, face_normals, smooth_angle_deg):
     """Number of the value that each corner of the triangles takes, int64 (3 K,); which see each other across edges
     (M, 2)."""
     vertices = scene.triangles[triangles]
@@ -51,20 +53,22 @@ def _shared_corners(scene, kernel, triangles, receivers, smooth_angle_deg):
     is_sharp = sharp.ravel()[first] | sharp.ravel()[second]
     ends = [np.stack(pair, axis=1) for pair in ((first, _next_corner(second)), (_next_corner(first), second))]
     twins, is_sharp = np.concatenate(ends), np.tile(is_sharp, 2)
-    seen = _see_each_other(kernel, receivers, twins)
+    seen = _see_each_other(kernel, receivers, face_normals, twins)
     twins, is_sharp = twins[seen], is_sharp[seen]
     cosines = np.einsum("nc,nc->n", normals[twins[:, 0]], normals[twins[:, 1]])
     is_shared = ~is_sharp & (cosines > np.cos(np.radians(smooth_angle_deg)))
     return _components(3 * len(triangles), twins[is_shared]), twins
 
 
-def _see_each_other(kernel, receivers, pairs):
-    """Whether nothing stands between receivers (M, 2), a little above their faces: bool (M,)."""
+def _see_each_other(kernel, receivers, face_normals, pairs):
+    """Whether nothing but their own faces, of normals (K, 3), stands between receivers (M, 2): bool (M,)."""
     start, end = (receivers.positions[column] for column in pairs.T)
-    lift = LIFT * np.linalg.norm(end - start, axis=1, keepdims=True)
-    start += lift * receivers.normals[pairs[:, 0]]
-    end += lift * receivers.normals[pairs[:, 1]]
-    return ~kernel.occluded(start, end)
+    first, second = (face_normals[column // 3] for column in pairs.T)
+    apart = end - start
+    # where faces bend away from each other, the edge between them rises no more than one lies below the other's plane
+    below = np.maximum(np.einsum("nc,nc->n", apart, second), -np.einsum("nc,nc->n", apart, first))
+    lift = (LIFT * np.linalg.norm(apart, axis=1) + np.maximum(below, 0.0))[:, None]
+    return ~kernel.occluded(start + lift * first, end + lift * second)
 
 
 def _next_corner(corner):

@@ -98,8 +98,10 @@ def test_a_cubes_corners_share_within_their_face_only():
         assert group <= {2 * face, 2 * face + 1}
 
 
-def test_a_smooth_balls_corners_share_around_each_vertex():
-    scene = scene_of([sphere((0, 0, 0), 1)])
+@pytest.mark.parametrize(("rings", "segments"), [(3, 4), (4, 6), (16, 32)])
+def test_a_smooth_balls_corners_share_around_each_vertex(rings, segments):
+    """However its faces bend: what rises between them is their own edge."""
+    scene = scene_of([sphere((0, 0, 0), 1, rings=rings, segments=segments)])
     groups = shared_vertices(scene)
     for corner, group in enumerate(groups):
         vertex = scene.triangles.ravel()[corner]
@@ -115,6 +117,15 @@ def test_a_wide_smooth_angle_does_not_join_faces_across_a_sharp_edge():
     marked = replace(scene, objects=(replace(scene.objects[0], sharp_edges=sharp),))
     for corner, group in enumerate(shared_vertices(marked, 180.0)):
         assert group <= ({0, 1} if corner < 6 else {2, 3})
+
+
+@pytest.mark.parametrize("degrees", [-60, -20, 20, 60])
+def test_faces_that_bend_off_share_up_to_the_smooth_angle(degrees):
+    x, z = 1 + np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (x, 0, z), (x, 1, z)]
+    fold = scene_of([Part(corners, [(0, 1, 2), (0, 2, 3), (1, 4, 5), (1, 5, 2)])])
+    assert any(group & {0, 1} and group & {2, 3} for group in shared_vertices(fold, abs(degrees) + 1))
+    assert not any(group & {0, 1} and group & {2, 3} for group in shared_vertices(fold, abs(degrees) - 1))
 
 
 def test_objects_that_only_touch_do_not_share():
