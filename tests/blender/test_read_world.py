@@ -268,7 +268,7 @@ def test_a_cube_under_a_turned_sky_has_the_light_that_cycles_gives_it(sky_image,
     light = {}
     for name, bake_it in (("cycles", cycles_light), ("ours", our_light)):
         light[name] = bake_it(cube)
-    # Cycles' 1024 samples and our error of 0.01, over the 24 corners of each; no two faces are alike to a third
+    # Cycles' 1024 samples and our error of 0.003, over the 24 corners of each; no two faces are alike to a third
     np.testing.assert_allclose(light["ours"], light["cycles"], rtol=0.03)
 
 
@@ -291,6 +291,7 @@ def cycles_light(obj):
 def our_light(obj):
     """The same by the bake."""
     scene = read_scene(bpy.context.scene)
-    colours = bake(scene, BakeSettings(target="vertex", error=0.01)).corner_colours
+    # of the light and a third of the median: the dimmest face is a tenth of that, and is to be known to 3 %
+    colours = bake(scene, BakeSettings(target="vertex", error=0.003)).corner_colours
     faces = scene.objects[0].polygons
     return np.array([colours[faces == face].mean(axis=(0, 1)) for face in range(len(obj.data.polygons))])
