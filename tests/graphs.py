@@ -1,4 +1,4 @@
-"""Graphs of values for receivers that are no mesh's: alone, or neighbours of those beside them in a row."""
+"""Graphs of values: of receivers that are no mesh's, alone or in a row, and of a scene's vertices."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from addon.core.vertices import vertex_receivers
 from tests.scenes import kernel_of
 
 
-def row_graph(count, reach=0, nearness=1.0, owners=None):
+def row_graph(count, reach=0, owners=None):
     """Each of ``count`` receivers a value (or as ``owners`` say), its neighbours those up to ``reach`` beside it."""
     owners = np.arange(count) if owners is None else owners
     sizes = np.bincount(owners)
@@ -21,7 +21,7 @@ def row_graph(count, reach=0, nearness=1.0, owners=None):
         shares=1 / sizes[owners],
         first_edges=np.append(0, np.cumsum(is_there.sum(axis=1))).astype(np.int32),
         neighbours=around[is_there].astype(np.int32),
-        nearness=np.full(is_there.sum(), nearness, np.float32),
+        nearness=np.ones(is_there.sum(), np.float32),
         shown=(count / max(values, 1) / sizes[owners]).astype(np.float32),
     )
 

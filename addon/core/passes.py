@@ -24,9 +24,7 @@ MANY = 1 << 16  # not know it, but of so many receivers neighbours vouch for eac
 FIRST_ERROR = 0.1  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
 HURRY = 4  # such passes could be had in the time there is, at the least: else all begin with the fewest
 MOST_RAYS = 2048  # of a replicate; a last few that are not WORTH a pass are not taken
-MOST_COST = (
-    15  # times what the fewest first rays cost may all passes, of vertices the most first rays, and FREE_RAYS at least,
-)
+MOST_COST = 15  # times what the fewest first rays cost (vertices' most) may all passes, and FREE_RAYS at least,
 FREE_RAYS = 1 << 26
 USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
 WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
@@ -177,9 +175,9 @@ def first_rays(fewest, error, in_time) -> int:
     return enough if HURRY * enough <= in_time else fewest
 
 
-def ray_budget(fewest_cost, error) -> int:
-    """Rays that all passes may take: ``fewest_cost`` is what the fewest first rays of each receiver take."""
-    return int(max(MOST_COST * fewest_cost, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
+def ray_budget(first_cost, error) -> int:
+    """Rays that all passes may take: ``first_cost`` is what the first rays take that the budget goes by."""
+    return int(max(MOST_COST * first_cost, FREE_RAYS) * max(1.0, (USUAL_ERROR / error) ** 2))
 
 
 def _show_what_was_gathered(job: GatherJob, grid, samples: _Samples, direct):

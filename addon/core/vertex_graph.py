@@ -75,12 +75,10 @@ class VertexGraph:
 
         Over neighbours' neighbours, too: who is next to a penumbra has all or nothing of a lamp by chance.
         """
-        del receivers
         return self._pooled(workers, self._variances(of_one_ray), 2)[self.owners]
 
     def blurred(self, workers: Workers, receivers: Receivers, values):
         """Gathered light float32 (N, 3), averaged over values and their neighbours: float32 (N, 3)."""
-        del receivers
         means, nothing = self._means(values), np.zeros(self.value_count, np.float32)
         return smooth_graph(workers, self, means, nothing, False)[0][self.owners]
 
@@ -89,7 +87,6 @@ class VertexGraph:
 
         ``scales`` (N,) are those of the light ``blurred``, ``taken`` (N,) how many rays each is of.
         """
-        del receivers
         scales = np.square(self._means(scales[:, None])[:, 0], dtype=np.float64)
         taken = self._means(taken[:, None])[:, 0]
         # pooled relative to the light there, as the noise of what is bright says nothing of the calm beside it

@@ -229,6 +229,7 @@ static Py_ssize_t grid_size(const pl_texel_grid *grid) {
     return grid->width > 0 && grid->height > 0 ? (Py_ssize_t)grid->width * grid->height : 0;
 }
 
+/* Texels without a receiver have any index below 0. */
 static bool grid_is_valid(const pl_texel_grid *grid, size_t receivers) {
     return grid->width >= 0 && grid->height >= 0 &&
            indices_are_valid(grid->receivers, (size_t)grid_size(grid), INT32_MIN, receivers, "grid");
