@@ -6,6 +6,7 @@ checks everything that it needs before it changes anything.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import bpy
@@ -57,7 +58,7 @@ def prepare(bpy_scene, settings: BakeSettings, object_names=None, subdivide: flo
     _require_subdivide(settings, subdivide)
     cuts = Cuts(subdivide)
     try:
-        scene = read_scene(bpy_scene, object_names, cuts.mesh_for if subdivide else None)
+        scene = read_scene(bpy_scene, settings, object_names, cuts.mesh_for if subdivide else None)
         targets = [scene_object.name for scene_object in scene.objects if scene_object.is_target]
         meshes = {name: _cut_or_own_mesh(name, cuts.meshes) for name in targets}
         if settings.target == "lightmap":
@@ -79,12 +80,14 @@ def write(prepared: PreparedBake, result) -> None:
         _require_complete(prepared, result.lightmap.uvs, "lightmap UVs")
         for name, mesh in meshes.items():
             require_layer_room(name, mesh)
+        if not prepared.settings.keep_uvs:
+            _require_own_places(meshes, result.lightmap.rects)
     else:
         _require_complete(prepared, result.corner_colours, "colours")
     for name in prepared.cut_meshes:
         _swap_mesh(bpy.data.objects[(name, None)], meshes[name])
     if prepared.settings.target == "lightmap":
-        write_lightmap(prepared.targets, result.lightmap)
+        write_lightmap(prepared.targets, result.lightmap, prepared.settings.keep_uvs)
     else:
         write_vertex_colours(prepared.targets, result.corner_colours)
 
@@ -142,6 +145,14 @@ def _checked_mesh(prepared, name):
     if len(mesh.loops) != prepared.corner_counts[name]:
         raise SceneError(f"the mesh of '{name}' was changed during the bake: nothing has been written")
     return mesh
+
+
+def _require_own_places(meshes, rects):
+    """Objects that have come to share a mesh since it was read would write over each other's UVs."""
+    users = Counter(mesh.name for mesh in meshes.values())
+    for name, mesh in meshes.items():
+        if users[mesh.name] > 1 and name not in rects:
+            raise SceneError(f"'{name}' came to share its mesh during the bake: nothing has been written")
 
 
 def _require_finite(what, values):

@@ -15,8 +15,9 @@ import numpy as np
 
 from .picture_materials import Light, LitMaterials
 from .read_mesh import LIGHTMAP_LAYER
+from .rects import in_lightmap, rect_of
 from .visibility import Visibility
-from .write_lightmap import IMAGE_PROPERTY, RECT_PROPERTY
+from .write_lightmap import IMAGE_PROPERTY, set_lightmap_uvs
 from .write_vertex_colours import ATTRIBUTE
 
 MIDDLE_GREY = 0.20  # radiance that the median of the picture is exposed to: dark corners open, sun patches keep shape
@@ -108,12 +109,9 @@ def _light_of(obj, mesh):
     image = obj.get(IMAGE_PROPERTY)
     layer = mesh.uv_layers.get(LIGHTMAP_LAYER)
     if image is not None and layer is not None:
-        rect = obj.get(RECT_PROPERTY)
-        if rect is not None:
-            uvs = np.empty(len(mesh.loops) * 2, np.float32)
-            layer.uv.foreach_get("vector", uvs)
-            uvs = uvs.reshape(-1, 2) * np.array(rect[:2]) + np.array(rect[2:])
-            layer.uv.foreach_set("vector", uvs.astype(np.float32).ravel())
+        uvs = np.empty(len(mesh.loops) * 2, np.float32)
+        layer.uv.foreach_get("vector", uvs)
+        set_lightmap_uvs(mesh, in_lightmap(uvs.reshape(-1, 2), rect_of(obj)))
         return Light(image=image)
     if ATTRIBUTE in mesh.color_attributes:
         return Light(attribute=ATTRIBUTE)

@@ -6,19 +6,24 @@ Blender's units are taken as metres whatever the unit scale: its lights are defi
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
 
 from ..core.scene import Scene, SceneError, SceneObject
+from ..core.settings import BakeSettings
 from .place_mesh import PlacedMesh, place_mesh, unit_normals
 from .read_lights import read_lights
 from .read_materials import Materials
 from .read_mesh import MeshArrays, are_finite, read_mesh
 from .read_world import read_world
-from .targets import mesh_users, why_not_target
+from .rects import in_lightmap, rect_of
+from .shared_meshes import SharedMeshes
+from .targets import why_not_target
 from .visibility import Visibility
+
+DEFAULTS = BakeSettings()
 
 
 class Warnings:
@@ -34,11 +39,12 @@ class Warnings:
         return tuple(self._sentences)
 
 
-def read_scene(bpy_scene, object_names=None, mesh_for=None) -> Scene:
+def read_scene(bpy_scene, settings: BakeSettings = DEFAULTS, object_names=None, mesh_for=None) -> Scene:
     """Read what a render of ``bpy_scene`` shows.
 
     Parameters
     ----------
+    settings : what decides which objects can be baked
     object_names : names of the objects to bake; None = all that can be
     mesh_for : callable (object, world matrix) -> Mesh or None; a mesh to read in place of a target's own
 
@@ -48,7 +54,7 @@ def read_scene(bpy_scene, object_names=None, mesh_for=None) -> Scene:
     """
     view_layer = _view_layer(bpy_scene)
     view_layer.update()
-    reading = SceneReading(view_layer, None if object_names is None else set(object_names), mesh_for)
+    reading = SceneReading(view_layer, settings, None if object_names is None else set(object_names), mesh_for)
     reading.read_objects()
     return reading.scene(bpy_scene.world)
 
@@ -62,11 +68,13 @@ class SceneReading:
     """A scene on its way from the depsgraph into arrays."""
 
     view_layer: object
+    settings: BakeSettings
     wanted: set[str] | None
     mesh_for: object
     warn: Warnings = field(default_factory=Warnings)
     placed: list[PlacedMesh] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
+    mesh_names: list[str | None] = field(default_factory=list)  # of the targets
     is_target: list[bool] = field(default_factory=list)
 
     def __post_init__(self):
@@ -78,7 +86,7 @@ class SceneReading:
     def read_objects(self):
         """Append every mesh entry of the depsgraph that a render shows."""
         self._require_known()
-        users = mesh_users(self.depsgraph)
+        shared = SharedMeshes(self.depsgraph, self.settings, self.wanted)
         entries = Counter()
         # The iterator's objects are temporary: nothing of them is kept past its turn of the loop. Curves and their
         # like come twice, as themselves and as meshes; only the meshes are taken.
@@ -88,7 +96,7 @@ class SceneReading:
             name = instance.object.name
             number, entries[name] = entries[name], entries[name] + 1
             if self.visibility.shows(instance):
-                self._read_instance(instance, f"{name}#{number}" if instance.is_instance else name, users)
+                self._read_instance(instance, f"{name}#{number}" if instance.is_instance else name, shared)
         self._require_targets()
         for name in self.visibility.viewport_hidden_names():
             self.warn(f"'{name}' is hidden in the viewport: the bake does not see it")
@@ -120,18 +128,18 @@ class SceneReading:
     def _objects(self):
         firsts = np.cumsum([0] + [len(p.triangles) for p in self.placed])
         return tuple(
-            SceneObject(name, int(first), len(p.triangles), target, **p.mesh_arrays())
-            for name, first, target, p in zip(self.names, firsts, self.is_target, self.placed)
+            SceneObject(name, int(first), len(p.triangles), target, mesh=mesh, **p.mesh_arrays())
+            for name, first, target, mesh, p in zip(self.names, firsts, self.is_target, self.mesh_names, self.placed)
         )
 
-    def _read_instance(self, instance, name, users):
+    def _read_instance(self, instance, name, shared):
         evaluated = instance.object
         matrix = np.array(instance.matrix_world, np.float64)
         mesh = evaluated.to_mesh()
         try:
             if not len(mesh.polygons):
                 return
-            target = self._is_wanted(evaluated.original.name) and self._is_target(instance, mesh, users)
+            target = self._is_wanted(evaluated.original.name) and self._is_target(instance, mesh, shared)
             replacement = self.mesh_for(evaluated.original, matrix) if target and self.mesh_for else None
             self._append(name, target, evaluated, replacement or mesh, matrix)
         finally:
@@ -146,9 +154,13 @@ class SceneReading:
             return
         materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
         placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
+        if target and self.settings.keep_uvs and placed.lightmap_uvs is not None:
+            in_rect = in_lightmap(placed.lightmap_uvs, rect_of(evaluated.original)).astype(np.float32)
+            placed = replace(placed, lightmap_uvs=in_rect)
         self.placed.append(placed)
         self.names.append(name)
         self.is_target.append(target)
+        self.mesh_names.append(evaluated.original.data.name if target else None)
 
     def _slot_materials(self, evaluated, mesh):
         """Rows of ``materials`` by material slot, int32 (slots or 1,), and the UV layers that they ask for."""
@@ -174,8 +186,8 @@ class SceneReading:
     def _is_wanted(self, name):
         return self.wanted is None or name in self.wanted
 
-    def _is_target(self, instance, mesh, users):
-        reason = why_not_target(instance, mesh, users)
+    def _is_target(self, instance, mesh, shared):
+        reason = why_not_target(instance, mesh, shared)
         if reason is None:
             return True
         name = instance.object.original.name

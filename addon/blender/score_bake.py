@@ -16,7 +16,8 @@ from ..core.relative import DARK
 from ..core.scene import exitance_from_radiance
 from .files import FileError
 from .read_mesh import LIGHTMAP_LAYER
-from .write_lightmap import IMAGE_PROPERTY, RECT_PROPERTY
+from .rects import in_lightmap, rect_of
+from .write_lightmap import IMAGE_PROPERTY
 
 KEYS = ("object", "triangle", "bary", "position", "irradiance", "stderr")
 LIT = 1e-4  # of the mean: points below it do not count for the median
@@ -122,8 +123,7 @@ def _on_object(graph, object_name, matrix, part, allowed):
     corners = _all_of(mesh.vertices, "co", np.float32, 3)[vertices[chosen]] @ matrix[:3, :3].T + matrix[:3, 3]
     points = np.einsum("nk,nkc->nc", part["bary"], corners)
     uvs = np.einsum("nk,nkc->nc", part["bary"], _all_of(layer.uv, "vector", np.float32, 2)[loops[chosen]])
-    scale_u, scale_v, offset_u, offset_v = original.get(RECT_PROPERTY, (1.0, 1.0, 0.0, 0.0))
-    looked_up = bilinear(_pixels(image), uvs * (scale_u, scale_v) + (offset_u, offset_v))
+    looked_up = bilinear(_pixels(image), in_lightmap(uvs, rect_of(original)))
     is_same = np.linalg.norm(points - part["position"], axis=1) <= allowed
     values[is_same] = looked_up[is_same]
     return values

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 import numpy as np
 
 from .read_mesh import corner_vertices
+from .shared_meshes import SharedMeshes
 
 KINDS = {"CURVE": "a curve", "SURFACE": "a NURBS surface", "META": "a metaball", "FONT": "a text"}
 CONVERT = "convert it to a mesh to bake it"
@@ -19,16 +18,7 @@ KEEPS_FACES = {
 }
 
 
-def mesh_users(depsgraph) -> Counter:
-    """How many visible objects use each mesh, by the mesh's pointer."""
-    users = Counter()
-    for instance in depsgraph.object_instances:
-        if instance.object.type == "MESH" and not instance.is_instance and not instance.object.original.hide_render:
-            users[instance.object.original.data.as_pointer()] += 1
-    return users
-
-
-def why_not_target(instance, mesh, users: Counter) -> str | None:
+def why_not_target(instance, mesh, shared: SharedMeshes) -> str | None:
     """Why no result can be stored on this entry of the depsgraph, or None when it can; ``mesh`` is as evaluated."""
     blender_object = instance.object.original
     name = blender_object.name
@@ -39,16 +29,11 @@ def why_not_target(instance, mesh, users: Counter) -> str | None:
     data = blender_object.data
     if blender_object.library or data.library or blender_object.override_library:
         return f"'{name}' is linked from another file: it is not baked; make it local to bake it"
-    if users[data.as_pointer()] > 1:
-        return (
-            f"'{name}' shares its mesh '{data.name}' with other objects: it is not baked; "
-            "make it a single user (Object > Relations > Make Single User) to bake it"
-        )
     if data.is_editmode:
         return f"'{name}' is in Edit Mode: it is not baked; leave Edit Mode to bake it"
     if not _has_faces_of(mesh, data):
         return _modified(blender_object)
-    return None
+    return shared.why_not(blender_object)
 
 
 def _instanced(instancer, name):

@@ -7,10 +7,10 @@ import numpy as np
 
 from ..core.scene import SceneError
 from .read_mesh import LIGHTMAP_LAYER
+from .rects import WHOLE, in_mesh, set_rect
 
 IMAGE_NAME = "Patchlight Lightmap"
 IMAGE_PROPERTY = "patchlight_lightmap"
-RECT_PROPERTY = "patchlight_rect"
 MOST_LAYERS = 8
 
 
@@ -20,28 +20,47 @@ def require_layer_room(name, mesh) -> None:
         raise SceneError(f"'{name}' already has {MOST_LAYERS} UV maps: remove one to make room for '{LIGHTMAP_LAYER}'")
 
 
-def write_lightmap(targets, lightmap) -> None:
-    """Store the UVs and the image. ``lightmap.pixels`` hold E / pi, float32 (H, W, 3), row 0 at v = 0."""
+def write_lightmap(targets, lightmap, keeps_uvs: bool) -> None:
+    """Store the image, and the UVs unless they are kept. ``lightmap.pixels`` hold E / pi, float32 (H, W, 3), row 0 at
+    v = 0."""
     objects = [bpy.data.objects[(target.name, None)] for target in targets]
     image = _image_for(objects, lightmap.pixels)
-    for target, blender_object in zip(targets, objects):
-        _write_uvs(blender_object.data, target.corners, lightmap.uvs[target.span])
+    if not keeps_uvs:
+        _write_uvs(targets, objects, lightmap)
+    for blender_object in objects:
         blender_object[IMAGE_PROPERTY] = image
-        if RECT_PROPERTY in blender_object:  # of an earlier bake; these UVs are in the whole image
-            del blender_object[RECT_PROPERTY]
         blender_object.update_tag()
 
 
-def _write_uvs(mesh, corners, uvs):
-    layer = mesh.uv_layers.get(LIGHTMAP_LAYER) or _new_layer(mesh)
-    values = np.zeros((len(mesh.loops), 2), np.float32)
-    has_place = np.isfinite(uvs).all(axis=(1, 2))  # a triangle without area may have none
-    values[corners[has_place]] = uvs[has_place]
-    layer.uv.foreach_set("vector", values.ravel())
+def _write_uvs(targets, objects, lightmap):
+    by_mesh = {}
+    for target, blender_object in zip(targets, objects):
+        mesh, uvs = blender_object.data, lightmap.uvs[target.span]
+        rect = lightmap.rects.get(target.name)
+        set_rect(blender_object, rect)
+        has_place = np.isfinite(uvs).all(axis=(1, 2))  # a triangle without area may have none
+        if mesh.name not in by_mesh:
+            by_mesh[mesh.name] = np.zeros((len(mesh.loops), 2), np.float32)
+        own = in_mesh(uvs[has_place], np.array(rect or WHOLE))
+        by_mesh[mesh.name][target.corners[has_place]] = own
+    for name, values in by_mesh.items():
+        mesh = bpy.data.meshes[(name, None)]
+        if LIGHTMAP_LAYER not in mesh.uv_layers:
+            _add_layer(mesh)
+        set_lightmap_uvs(mesh, values)
+
+
+def set_lightmap_uvs(mesh, uvs) -> None:
+    """Store UVs (loops, 2) in the layer "Lightmap" of this mesh alone.
+
+    Not by ``uv_layers[...].uv``: a copy of a mesh shares its arrays until one of them is written, and that way in does
+    not part them (Blender 4.5), so that the other mesh would get these UVs as well.
+    """
+    mesh.attributes[LIGHTMAP_LAYER].data.foreach_set("vector", np.ascontiguousarray(uvs, np.float32).ravel())
     mesh.update()
 
 
-def _new_layer(mesh):
+def _add_layer(mesh):
     """A UV layer; which one is edited and which one textures use stays as it was."""
     active = mesh.uv_layers.active_index
     render = next((layer.name for layer in mesh.uv_layers if layer.active_render), None)
@@ -49,7 +68,6 @@ def _new_layer(mesh):
     if render is not None:
         mesh.uv_layers.active_index = active
         mesh.uv_layers[render].active_render = True
-    return mesh.uv_layers[LIGHTMAP_LAYER]
 
 
 def _image_for(objects, pixels):

@@ -66,7 +66,7 @@ def bake(
         open_denoiser(denoiser_library, settings, progress.poll) as (denoise, no_denoiser),
     ):
         if settings.target == "lightmap":
-            receivers, grid, seen = _on_texels(scene, settings, progress)
+            receivers, grid, seen, rects = _on_texels(scene, settings, progress)
             kernel = KernelScene(scene, workers)
         else:
             progress.begin("texels")
@@ -87,7 +87,7 @@ def bake(
         progress.begin("texels")
         lightmap = corner_colours = None
         if settings.target == "lightmap":
-            lightmap = assemble(irradiance.values, grid.receivers, grid.uvs)
+            lightmap = assemble(irradiance.values, grid.receivers, grid.uvs, rects)
             lightmap = replace(lightmap, uvs=sound.spread(lightmap.uvs))
         else:
             corner_colours = np.full((len(scene.triangles), 3, 3), np.nan, np.float32)
@@ -101,14 +101,14 @@ def bake(
 
 
 def _on_texels(scene: Scene, settings: BakeSettings, progress: Progress):
-    """A lightmap's receivers, the grid of texels that they are, and points at which it is looked up."""
+    """A lightmap's receivers, the grid of texels that they are, points at which it is looked up, and objects' rects."""
     progress.begin("unwrap")
     charts = unwrap(scene, settings, progress.step)
     progress.begin("texels")
     texel_map = texels(charts)
     receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
     grid = texel_grid(scene, charts, texel_map, receivers)
-    return receivers, grid, seen_through_lightmap(scene, grid.receivers, grid.uvs, settings.seed)
+    return receivers, grid, seen_through_lightmap(scene, grid.receivers, grid.uvs, settings.seed), charts.rects
 
 
 def _require_targets(sound: SoundFaces) -> None:

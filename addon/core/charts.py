@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,12 +19,15 @@ class Charts:
         triangles without a place: those of other objects, and polygons without an area
     charts : int32 (T,) which chart a triangle is part of; -1 without a place
     width, height : of the lightmap [texels]
+    rects : of objects that share a mesh, by name, (scale_u, scale_v, offset_u, offset_v) [texels]: where the square
+        from 0 to 1, in which the mesh's one layout lies, is for them
     """
 
     uvs: np.ndarray
     charts: np.ndarray
     width: int
     height: int
+    rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +57,15 @@ class FlatCharts:
     @property
     def sizes(self) -> np.ndarray:
         """Extents of the charts along u and v, float64 (C, 2) [m]."""
+        if not self.chart_count:
+            return np.zeros((0, 2))
         return np.maximum.reduceat(self.uvs.max(axis=1), self.first_triangles[:-1])
+
+    @property
+    def areas(self) -> np.ndarray:
+        """Of the charts, float64 (C,) [m^2]."""
+        a, b = self.uvs[:, 1] - self.uvs[:, 0], self.uvs[:, 2] - self.uvs[:, 0]
+        return np.bincount(self.chart_of_row, np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2, self.chart_count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +92,11 @@ class TargetSurface:
     loops: np.ndarray
 
 
-def target_surface(scene: Scene) -> TargetSurface:
-    """The triangles of the scene's target objects; SceneError where there are none with an area."""
-    targets = [obj for obj in scene.objects if obj.is_target and obj.count]
+def target_surface(scene: Scene, groups=()) -> TargetSurface:
+    """The triangles of the scene's target objects, of ``groups`` that share a mesh only the first's; SceneError where
+    there are none with an area."""
+    copies = {obj.first for _, *others in groups for obj in others}
+    targets = [obj for obj in scene.objects if obj.is_target and obj.count and obj.first not in copies]
     triangles, objects, polygons, loops = [], [], [], []
     row = polygon_count = loop_count = 0
     for obj in targets:

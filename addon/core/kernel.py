@@ -273,14 +273,15 @@ def rasterise_texels(uvs, width, height):
     return triangles, distances, barycentrics
 
 
-def pack_charts(uvs, first_triangles, density, width, block):
+def pack_charts(uvs, first_triangles, density, width, block, upright=0):
     """Places int32 (C, 3) (column, row, is turned) of charts in an atlas, and the rows that they take [texels].
 
     ``uvs`` float64 (T, 3, 2), triangles sorted by chart; chart c has ``first_triangles[c] : first_triangles[c + 1]``.
+    So many charts as ``upright``, the last ones, are not turned.
     """
     places = np.empty((len(first_triangles) - 1, 3), np.int32)
     first_triangles = _rows(first_triangles, np.int32)
-    height = _kernel.pack_charts(_rows(uvs, np.float64), first_triangles, density, width, block, places)
+    height = _kernel.pack_charts(_rows(uvs, np.float64), first_triangles, upright, density, width, block, places)
     return places, height
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,22 +18,28 @@ class Lightmap:
     ----------
     pixels : float32 (H, W, 3) E / pi, linear Rec.709; row 0 is at v = 0
     uvs : float32 (T, 3, 2) in 0..1; NaN on triangles without a place
+    rects : (scale_u, scale_v, offset_u, offset_v) of the objects that share a mesh, by name: ``uvs`` are what they make
+        of the mesh's own, which lie in 0..1, too
     """
 
     pixels: np.ndarray
     uvs: np.ndarray
+    rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
 
 
-def assemble(irradiance: np.ndarray, cells: np.ndarray, uvs: np.ndarray) -> Lightmap:
+def assemble(irradiance: np.ndarray, cells: np.ndarray, uvs: np.ndarray, rects=None) -> Lightmap:
     """The lightmap of receivers' irradiance (N, 3) [W/m^2]; no texel stays empty, so that mipmaps see no black.
 
-    ``cells`` int32 (H, W) is the receiver that each texel is, -1 for none, ``uvs`` the corners' in texels (T, 3, 2).
+    ``cells`` int32 (H, W) is the receiver that each texel is, -1 for none, ``uvs`` the corners' in texels (T, 3, 2),
+    ``rects`` those of Charts.
     """
     height, width = cells.shape
     pixels, is_set = np.zeros((height, width, 3), np.float32), cells >= 0
     pixels[is_set] = radiance_from_exitance(irradiance)[cells[is_set]]
     fill_gaps(pixels, is_set)
-    return Lightmap(pixels, uvs / np.float32([width, height]))
+    size = (width, height)
+    rects = {name: tuple(np.divide(rect, size + size).tolist()) for name, rect in (rects or {}).items()}
+    return Lightmap(pixels, uvs / np.float32(size), rects)
 
 
 def look_up(lightmap: Lightmap, triangles, barycentrics):

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import kernel
+from .blocks import CHART_MARGIN, CHART_START, Block, pack_block, placed
 from .charts import Charts, FlatCharts
+from .copies import Layout
 from .settings import BakeSettings, SettingsError
 
-CHART_START = 0.504  # PL_CHART_START of the kernel: where a chart starts in its first texel
-CHART_MARGIN = 3  # texels that a chart takes beyond its size, with its gutter
 MOST_TEXELS = 1 << 28
 MOST_BLOCKS = 2048  # across the atlas; wider ones are packed in blocks of several texels
 FULL_ENOUGH = 0.985  # of the texels asked for
@@ -29,34 +29,66 @@ LARGE_CHART = 0.2  # of the width
 
 
 @dataclass(frozen=True, slots=True)
+class Surface:
+    """What is to be packed: charts of objects with a mesh of their own, and layouts that objects share."""
+
+    flat: FlatCharts
+    layouts: tuple[Layout, ...]
+
+    @property
+    def area(self) -> float:
+        """[m^2]"""
+        return self.flat.areas.sum() + sum(
+            (layout.flat.areas.sum() * layout.factors.prod(axis=1)).sum() for layout in self.layouts
+        )
+
+    @property
+    def longest(self) -> float:
+        """Side of a chart [m]."""
+        sides = [layout.flat.sizes.max() * layout.factors.max() for layout in self.layouts]
+        return max([*sides, self.flat.sizes.max(initial=0.0)])
+
+    @property
+    def chart_count(self) -> int:
+        return self.flat.chart_count + sum(layout.flat.chart_count * len(layout.objects) for layout in self.layouts)
+
+
+@dataclass(frozen=True, slots=True)
 class Packing:
-    """One try: places int32 (C, 3) in blocks (column, row, is turned), at a density [texels/m]."""
+    """One try, at a density [texels/m].
+
+    ``places`` int32 in blocks of so many texels (column, row, is turned): of the charts, then of each layout's objects,
+    whose ``layout_blocks`` say how large they are. ``longest`` is the longest side of all of these [texels].
+    """
 
     places: np.ndarray
     density: float
     width: int
     height: int
     block: int
+    longest: float
+    layout_blocks: tuple[Block, ...]
 
     @property
     def texels(self) -> int:
         return self.width * self.height
 
 
-def pack(flat: FlatCharts, triangle_count: int, settings: BakeSettings) -> Charts:
+def pack(surface: Surface, triangle_count: int, settings: BakeSettings) -> Charts:
     """The atlas of the charts, at most ``settings.texels`` texels, or of ``settings.density``."""
     if settings.density is not None:
-        packing = _pack_at_density(flat, settings.density)
+        packing = _pack_at_density(surface, settings.density)
     else:
-        packing = _pack_into(flat, settings.texels)
-    return _charts(flat, triangle_count, packing)
+        packing = _pack_into(surface, settings.texels)
+    return _charts(surface, triangle_count, packing)
 
 
-def _pack_at_density(flat, density):
-    area = _area(flat) * density**2
+def _pack_at_density(surface, density):
+    area = surface.area * density**2
     if area <= MOST_TEXELS:
-        width = math.ceil(math.sqrt(np.prod(flat.sizes * density + CHART_MARGIN, axis=1).sum()))
-        packing = _pack_once(flat, density, min(width, 1 << 15))
+        sides = _boxes(surface, density)[0].sizes * density + CHART_MARGIN
+        width = math.ceil(math.sqrt(sides.prod(axis=1).sum()))
+        packing = _pack_once(surface, density, min(width, 1 << 15))
         area = packing.texels
     if area > MOST_TEXELS:
         raise SettingsError(
@@ -65,36 +97,36 @@ def _pack_at_density(flat, density):
     return packing
 
 
-def _pack_into(flat, texels):
+def _pack_into(surface, texels):
     """As dense as it fits; the width of the square first, others where large charts make it matter."""
     width = math.isqrt(texels)
-    best = _densest(flat, texels, width, math.sqrt(0.7 * texels / _area(flat)))
-    if flat.sizes.max() * best.density < LARGE_CHART * width:
+    best = _densest(surface, texels, width, math.sqrt(0.7 * texels / surface.area))
+    if best.longest < LARGE_CHART * width:
         return best
-    if flat.chart_count <= FEW_CHARTS and width <= MOST_BLOCKS:
-        others = [_densest(flat, texels, round(width * factor), best.density) for factor in FINE_WIDTHS]
+    if surface.chart_count <= FEW_CHARTS and width <= MOST_BLOCKS:
+        others = [_densest(surface, texels, round(width * factor), best.density) for factor in FINE_WIDTHS]
         return max([best, *others], key=lambda packing: packing.density)
-    others = [_pack_once(flat, best.density, round(width * factor)) for factor in WIDTHS]
+    others = [_pack_once(surface, best.density, round(width * factor)) for factor in WIDTHS]
     smallest = min(others, key=lambda packing: packing.texels)
     if smallest.texels >= best.texels:
         return best
     density = best.density * math.sqrt(texels / smallest.texels)
-    return max(best, _densest(flat, texels, smallest.width, density), key=lambda packing: packing.density)
+    return max(best, _densest(surface, texels, smallest.width, density), key=lambda packing: packing.density)
 
 
-def _densest(flat, texels, width, density):
+def _densest(surface, texels, width, density):
     """The densest packing found in a few tries: what a density takes is known by trying only."""
     best, tries = None, []
     for _ in range(ATTEMPTS):
         # no chart is longer than all texels in a row, however thin
-        tried = _pack_once(flat, min(density, texels / flat.sizes.max()), width)
+        tried = _pack_once(surface, min(density, texels / surface.longest), width)
         tries.append(tried)
         if tried.texels <= texels and (best is None or tried.density > best.density):
             best = tried
         if FULL_ENOUGH * texels <= tried.texels <= texels:
             return tried
         density = _next_density(tries, texels)
-    return best or _loosest(flat, texels, width, min(tried.density for tried in tries))
+    return best or _loosest(surface, texels, width, min(tried.density for tried in tries))
 
 
 def _next_density(tries, texels):
@@ -107,40 +139,57 @@ def _next_density(tries, texels):
     return last.density * (0.995 * texels / last.texels) ** (1 / power)
 
 
-def _loosest(flat, texels, width, density):
+def _loosest(surface, texels, width, density):
     """Go down until it fits; where even specks do not fit there are too many charts."""
     for _ in range(24):
         density *= 0.8
-        tried = _pack_once(flat, density, width)
+        tried = _pack_once(surface, density, width)
         if tried.texels <= texels:
             return tried
     raise SettingsError(
-        f"texels is {texels}: {flat.chart_count} charts of the target objects need at least {tried.texels}"
+        f"texels is {texels}: {surface.chart_count} charts of the target objects need at least {tried.texels}"
     )
 
 
-def _pack_once(flat, density, width):
-    longest = flat.sizes.max() * density + CHART_MARGIN
-    width = max(width, min(math.ceil(longest), MOST_TEXELS))
+def _pack_once(surface, density, width):
+    boxes, layout_blocks = _boxes(surface, density)
+    longest = boxes.sizes.max() * density
+    width = max(width, min(math.ceil(longest + CHART_MARGIN), MOST_TEXELS))
     block = -(-width // MOST_BLOCKS)
     width = width // block * block if width % block == 0 else (width // block + 1) * block
-    places, height = kernel.pack_charts(flat.uvs, flat.first_triangles, density, width, block)
-    return Packing(places, density, width, height, block)
+    # a rectangle of UVs (scale, offset) cannot turn what lies in it
+    upright = boxes.chart_count - surface.flat.chart_count
+    places, height = kernel.pack_charts(boxes.uvs, boxes.first_triangles, density, width, block, upright)
+    return Packing(places, density, width, height, block, longest, layout_blocks)
 
 
-def _charts(flat, triangle_count, packing):
-    places = packing.places[flat.chart_of_row]
-    uvs = flat.uvs * packing.density
-    uvs = np.where(places[:, 2, None, None] == 1, uvs[..., ::-1], uvs)
-    uvs += places[:, None, :2] * packing.block + CHART_START
-    out = np.full((triangle_count, 3, 2), np.nan, np.float32)
+def _boxes(surface, density):
+    """The charts, and behind them a rectangle for each object of the layouts, which are packed by themselves."""
+    if not surface.layouts:
+        return surface.flat, ()
+    blocks = tuple(pack_block(layout, density) for layout in surface.layouts)
+    u, v = (np.concatenate([block.sizes for block in blocks]) / density).T
+    zero = np.zeros_like(u)
+    corners = np.stack([zero, zero, u, zero, u, v, zero, zero, u, v, zero, v], axis=1).reshape(-1, 3, 2)
+    flat = surface.flat
+    firsts = np.append(flat.first_triangles, len(flat.uvs) + 2 * np.arange(1, len(u) + 1)).astype(np.int32)
+    triangles = np.append(flat.triangles, np.full(len(corners), -1))
+    return FlatCharts(triangles, np.concatenate([flat.uvs, corners]), firsts), blocks
+
+
+def _charts(surface, triangle_count, packing):
+    flat = surface.flat
+    uvs = np.full((triangle_count, 3, 2), np.nan, np.float32)
     charts = np.full(triangle_count, -1, np.int32)
-    out[flat.triangles] = uvs
+    uvs[flat.triangles] = placed(flat, packing.density, packing.places[: flat.chart_count], packing.block)
     charts[flat.triangles] = flat.chart_of_row
-    return Charts(out, charts, packing.width, packing.height)
-
-
-def _area(flat):
-    """Of the flat charts [m^2]."""
-    a, b = flat.uvs[:, 1] - flat.uvs[:, 0], flat.uvs[:, 2] - flat.uvs[:, 0]
-    return np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2
+    count, rects, offsets = flat.chart_count, {}, packing.places[flat.chart_count :, :2] * packing.block + CHART_START
+    for layout, block in zip(surface.layouts, packing.layout_blocks):
+        own_offsets, offsets = np.split(offsets, [len(layout.objects)])
+        for obj, scale, offset in zip(layout.objects, block.scales, own_offsets):
+            own_uvs, own_charts = layout.spread(block.uvs, obj)
+            uvs[obj.span] = own_uvs * scale + offset
+            charts[obj.span] = np.where(own_charts >= 0, own_charts + count, -1)
+            count += layout.flat.chart_count
+            rects[obj.name] = (*np.maximum(block.size, 1e-9) * scale, *offset)
+    return Charts(uvs, charts, packing.width, packing.height, rects)

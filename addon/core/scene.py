@@ -169,6 +169,7 @@ class SceneObject:
     polygons : int32 (count,) which polygon of the object's mesh each triangle is part of: a polygon's triangles stay
         together in a chart
     corners : int32 (count, 3) which face corner (Blender: loop) of the object's mesh each triangle corner is
+    mesh : name of the mesh, or None; objects of one name share its UVs, and need ``polygons`` and ``corners``
     lightmap_uvs : float32 (count, 3, 2) or None, the existing "Lightmap" UVs, for ``keep_uvs``
     sharp_edges : bool (count, 3) edge k runs from triangle corner k to corner (k + 1) % 3; True = vertex colours are
         not shared across it
@@ -180,6 +181,7 @@ class SceneObject:
     is_target: bool = True
     polygons: np.ndarray | None = None
     corners: np.ndarray | None = None
+    mesh: str | None = None
     lightmap_uvs: np.ndarray | None = None
     sharp_edges: np.ndarray | None = None
 
@@ -191,6 +193,8 @@ class SceneObject:
             array, expected = getattr(self, name), (self.count, *shape)
             if array is not None and np.shape(array) != expected:
                 raise SceneError(f"object {self.name}: {name}: expected {expected}, got {np.shape(array)}")
+        if self.mesh is not None and (self.polygons is None or self.corners is None):
+            raise SceneError(f"object {self.name}: one that shares a mesh needs polygons and corners")
 
     @property
     def span(self) -> slice:

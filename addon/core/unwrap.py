@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from .charts import Charts, target_surface
+from .copies import copies_of, layouts
 from .cut import cut
 from .flatten import flatten
-from .packing import pack
+from .packing import Surface, pack
 from .scene import Scene, SceneError
 from .settings import BakeSettings
 
@@ -20,13 +21,14 @@ def unwrap(scene: Scene, settings: BakeSettings, on_step: Callable[[float], None
 
     All objects share one atlas of at most ``settings.texels`` texels, or of ``settings.density`` texels/m. No texel is
     within bilinear reach of two charts, and one free texel lies between them for mipmaps. Polygons stay whole: a loop
-    has one UV. Same input, same bytes.
+    has one UV, and where objects share a mesh, one place within each object's rectangle. Same input, same bytes.
 
     With ``settings.keep_uvs`` the objects' own UVs decide, over a square of ``settings.texels``; they may overlap.
 
     ``on_step(done)`` hears after each stage how much (0..1) is done; what it raises ends the work.
     """
-    surface = target_surface(scene)
+    groups = copies_of(scene)
+    surface = target_surface(scene, groups)
     if settings.keep_uvs:
         return _kept(scene, settings.texels)
     on_step = on_step or (lambda done: None)
@@ -34,7 +36,7 @@ def unwrap(scene: Scene, settings: BakeSettings, on_step: Callable[[float], None
     on_step(0.6)
     flat = flatten(surface, pieces)
     on_step(0.7)
-    charts = pack(flat, len(scene.triangles), settings)
+    charts = pack(Surface(*layouts(scene, flat, groups)), len(scene.triangles), settings)
     on_step(1.0)
     return charts
 

@@ -366,6 +366,7 @@ pl_status pl_rasterise_texels(const float *uvs, size_t triangle_count, int32_t w
  *
  *   uvs              6 * triangle_count: corners in a frame of the chart's own, not negative, from (0, 0)
  *   first_triangles  chart_count + 1: chart c has triangles first_triangles[c] .. first_triangles[c + 1] - 1
+ *   upright          so many charts, the last ones, are not turned
  *   density          texels per unit of uvs
  *   width            of the atlas [texels], at most PL_WIDEST_ATLAS
  *   block            charts are placed in steps of so many texels; 1 packs best, more is faster in a large atlas
@@ -373,12 +374,14 @@ pl_status pl_rasterise_texels(const float *uvs, size_t triangle_count, int32_t w
  *                    swapped). A corner stands at block * (column, row) + PL_CHART_START + density * (u, v)
  *   out_height       rows used [texels]
  *
- * PL_ERR_ARGUMENT also where a corner is negative or no number, or a chart wider and higher than the atlas is wide.
+ * PL_ERR_ARGUMENT also where a corner is negative or no number, or a chart wider than the atlas is wide, and, where it
+ * may be turned, higher.
  */
 #define PL_CHART_START 0.504
 #define PL_WIDEST_ATLAS (1 << 28)
 pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t *first_triangles, size_t chart_count,
-                         double density, int32_t width, int32_t block, int32_t *out_places, int32_t *out_height);
+                         size_t upright, double density, int32_t width, int32_t block, int32_t *out_places,
+                         int32_t *out_height);
 
 /*
  * One level of edge-stopping smoothing over a lightmap's receivers.

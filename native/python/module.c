@@ -131,12 +131,13 @@ static PyObject *rasterise_texels(PyObject *self, PyObject *args) {
 
 static PyObject *pack_charts(PyObject *self, PyObject *args) {
     PyObject *objects[3];
+    Py_ssize_t upright;
     double density;
     int width, block;
     int32_t height = 0;
     pl_status status = PL_ERR_ARGUMENT;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOdiiO", &objects[0], &objects[1], &density, &width, &block, &objects[2]))
+    if (!PyArg_ParseTuple(args, "OOndiiO", &objects[0], &objects[1], &upright, &density, &width, &block, &objects[2]))
         return NULL;
     door_array arrays[] = {{"uvs", 'd', 6, -1, false, {0}},
                            {"first_triangles", 'i', 1, -1, false, {0}},
@@ -145,9 +146,9 @@ static PyObject *pack_charts(PyObject *self, PyObject *args) {
         return NULL;
 
     Py_BEGIN_ALLOW_THREADS
-    if (door_rows(&arrays[1]) == door_rows(&arrays[2]) + 1)
+    if (upright >= 0 && door_rows(&arrays[1]) == door_rows(&arrays[2]) + 1)
         status = pl_pack_charts(arrays[0].view.buf, door_rows(&arrays[0]), arrays[1].view.buf, door_rows(&arrays[2]),
-                                density, width, block, arrays[2].view.buf, &height);
+                                (size_t)upright, density, width, block, arrays[2].view.buf, &height);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, 3);
@@ -194,7 +195,7 @@ static PyMethodDef methods[] = {
     {"rasterise_texels", rasterise_texels, METH_VARARGS,
      "rasterise_texels(uvs, width, height, out_triangles, out_distances, out_barycentrics)"},
     {"pack_charts", pack_charts, METH_VARARGS,
-     "pack_charts(uvs, first_triangles, density, width, block, out_places) -> height"},
+     "pack_charts(uvs, first_triangles, upright, density, width, block, out_places) -> height"},
     {NULL, NULL, 0, NULL},
 };
 

@@ -32,7 +32,8 @@ typedef struct rectangle {
 typedef struct atlas_job {
     const double *uvs;
     const int32_t *first_triangles;
-    double density; /* blocks per unit */
+    size_t turnable; /* so many charts, the first ones, may be turned */
+    double density;  /* blocks per unit */
     int32_t block;
     int32_t columns;    /* of the atlas, in blocks */
     pl_bitmap atlas;    /* with a rim of one block, so that a gutter never leaves it */
@@ -199,7 +200,7 @@ static void take(atlas_job *job, bool is_turned, place at) {
 
 static pl_status place_chart(atlas_job *job, size_t chart, const int32_t size[2], uint64_t *scratch, int32_t *out_place,
                              int32_t *io_height) {
-    const bool can_turn = size[0] != size[1] || size[0] > 2;
+    const bool can_turn = chart < job->turnable && (size[0] != size[1] || size[0] > 2);
     /* above everything there is always room */
     const int32_t roof = *io_height + 2 + (size[0] > size[1] ? size[0] : size[1]);
     int32_t ceiling = roof + 1;
@@ -282,14 +283,16 @@ static bool are_runs(const int32_t *first, size_t count, size_t end) {
 }
 
 pl_status pl_pack_charts(const double *uvs, size_t triangle_count, const int32_t *first_triangles, size_t chart_count,
-                         double density, int32_t width, int32_t block, int32_t *out_places, int32_t *out_height) {
-    if (!(density > 0.0) || block < 1 || width < block || width > PL_WIDEST_ATLAS ||
+                         size_t upright, double density, int32_t width, int32_t block, int32_t *out_places,
+                         int32_t *out_height) {
+    if (!(density > 0.0) || upright > chart_count || block < 1 || width < block || width > PL_WIDEST_ATLAS ||
         !are_runs(first_triangles, chart_count, triangle_count))
         return PL_ERR_ARGUMENT;
 
     atlas_job job = {.uvs = uvs, .first_triangles = first_triangles, .density = density / (double)block};
     pl_status status = PL_ERR_MEMORY;
     int32_t height = 0;
+    job.turnable = chart_count - upright;
     job.block = block;
     job.columns = width / block;
     job.atlas.words = (job.columns + 2 + PL_WORD_BITS - 1) / PL_WORD_BITS;

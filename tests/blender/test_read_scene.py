@@ -9,16 +9,19 @@ from mathutils import Matrix
 
 from addon.blender.read_scene import read_scene
 from addon.core.scene import SceneError
+from addon.core.settings import BakeSettings
 from addon.core.sound_faces import sound_faces
 
 # Blender's positions and matrices are float32: one part in 10^7, times coordinates up to 10.
 FLOAT32 = 1e-5
 
+LIGHTMAP = BakeSettings()
+
 pytestmark = pytest.mark.usefixtures("empty_file")
 
 
-def read(**arguments):
-    return read_scene(bpy.context.scene, **arguments)
+def read(settings=LIGHTMAP, **arguments):
+    return read_scene(bpy.context.scene, settings, **arguments)
 
 
 def named(scene, name):
@@ -190,16 +193,58 @@ def test_instances_light_the_scene_under_their_numbers(add_cube):
     assert any("'Chair' is instanced by 'Place 0'" in warning for warning in scene.warnings)
 
 
-def test_linked_duplicates_are_not_baked_and_named(add_cube):
+@pytest.fixture
+def add_duplicate(add_cube):
+    """Add a room, and two cubes that share a mesh; the second of these."""
     add_cube("Room")
-    first = add_cube("First")
-    second = bpy.data.objects.new("Second", first.data)
+    second = bpy.data.objects.new("Second", add_cube("First").data)
     bpy.context.scene.collection.objects.link(second)
+    second.location = (5, 0, 0)
+    return second
+
+
+def test_linked_duplicates_are_read_with_their_mesh(add_duplicate):
     scene = read()
+    assert {o.name: o.mesh for o in scene.objects if o.is_target} == {
+        "Room": "Room",
+        "First": "First",
+        "Second": "First",
+    }
+    assert scene.warnings == ()
+
+
+def test_linked_duplicates_have_one_set_of_vertex_colours_and_are_not_baked(add_duplicate):
+    scene = read(BakeSettings(target="vertex"))
     assert [o.name for o in scene.objects if o.is_target] == ["Room"]
-    assert sum("shares its mesh 'First'" in warning for warning in scene.warnings) == 2
+    assert sum("shares its mesh 'First' with other objects, and so its vertex" in w for w in scene.warnings) == 2
     with pytest.raises(SceneError, match="'Second' shares its mesh"):
+        read(BakeSettings(target="vertex"), object_names=["Second"])
+
+
+def test_linked_duplicates_keep_uvs_only_with_a_place_each(add_duplicate):
+    mesh = add_duplicate.data
+    mesh.uv_layers.new(name="Lightmap", do_init=True)
+    with pytest.raises(SceneError, match="'Second' shares its mesh 'First' with other objects, and so its 'Lightmap'"):
+        read(BakeSettings(keep_uvs=True), object_names=["Second"])
+    add_duplicate["patchlight_rect"] = (0.5, 0.25, 0.5, 0.125)
+    scene = read(BakeSettings(keep_uvs=True), object_names=["Second"])
+    own = named(scene, "Second").lightmap_uvs
+    assert own.min(axis=(0, 1)) == pytest.approx((0.5, 0.125), abs=FLOAT32)
+    assert own.max(axis=(0, 1)) == pytest.approx((1.0, 0.375), abs=FLOAT32)
+    add_duplicate["patchlight_rect"] = "left"
+    with pytest.raises(SceneError, match="'Second': its custom property patchlight_rect is not four numbers"):
+        read(BakeSettings(keep_uvs=True), object_names=["Second"])
+
+
+def test_a_duplicate_is_not_unwrapped_under_the_lightmap_of_another(add_duplicate):
+    image = bpy.data.images.new("Baked", 4, 4)
+    bpy.data.objects["First"]["patchlight_lightmap"] = image
+    with pytest.raises(
+        SceneError, match="'Second' shares its mesh 'First' with 'First', whose lightmap would no longer"
+    ):
         read(object_names=["Second"])
+    assert sum(o.is_target for o in read(object_names=["First", "Second"]).objects) == 2
+    assert sum(o.is_target for o in read().objects) == 3
 
 
 def test_a_modifier_that_makes_faces_is_named(add_cube):

@@ -96,6 +96,20 @@ def test_a_lightmap_survives_saving(add_cube, tmp_path):
         assert "patchlight_rect" not in bpy.data.objects[target.name]
 
 
+def test_a_copy_of_a_baked_mesh_gets_uvs_of_its_own(add_cube):
+    first = add_cube("First")
+    prepared = prepared_for(LIGHTMAP)
+    write(prepared, result_for(prepared))
+    second = bpy.data.objects.new("Second", first.data.copy())  # as Shift D does it
+    bpy.context.scene.collection.objects.link(second)
+    prepared = prepared_for(LIGHTMAP)
+    result = result_for(prepared, seed=1)
+    write(prepared, result)
+    for target in prepared.targets:
+        uvs = stored_uvs(bpy.data.objects[target.name])
+        np.testing.assert_array_equal(uvs[target.corners], result.lightmap.uvs[target.span])
+
+
 def test_the_image_is_linear_float_data_and_packed(add_cube):
     cube = add_cube()
     prepared = prepared_for(LIGHTMAP)

@@ -293,12 +293,14 @@ def test_places_of_any_charts(data):
     uvs = arrays(data.draw, (int(first[-1]), 3, 2), np.float64, st.sampled_from((0.0, 0.3, 1.0, 5.0)) | lengths)
     density, width = data.draw(lengths), data.draw(st.sampled_from((-1, 0, 1, 64, 100, (1 << 31) - 1)))
     block, places = data.draw(st.sampled_from((-1, 0, 1, 3))), np.full((charts, 3), -9, np.int32)
+    upright = data.draw(st.sampled_from((0, 1, charts, charts + 1, -1)))
     try:
-        height = _kernel.pack_charts(uvs, first, density, width, block, places)
+        height = _kernel.pack_charts(uvs, first, upright, density, width, block, places)
     except REFUSALS:
         return
     assert (places[:, :2] >= 0).all()
     assert ((places[:, 2] == 0) | (places[:, 2] == 1)).all()
+    assert (places[charts - upright :, 2] == 0).all()
     assert height >= 0
 
 

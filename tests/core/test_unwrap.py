@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from addon.core.charts import FlatCharts
-from addon.core.packing import pack
+from addon.core.packing import Surface, pack
 from addon.core.scene import SceneError
 from addon.core.settings import BakeSettings, SettingsError
 from addon.core.texels import texels
@@ -180,7 +180,7 @@ def test_a_small_chart_finds_the_hole_of_a_large_one():
     frame += [[(19, 0), (20, 0), (20, 20)], [(19, 0), (20, 20), (19, 20)]]
     plate = [[(0, 0), (12, 0), (12, 12)], [(0, 0), (12, 12), (0, 12)]]
     flat = FlatCharts(np.arange(10), np.array(frame + plate, float), np.array([0, 8, 10], np.int32))
-    packed = pack(flat, 10, BakeSettings(density=1.0))
+    packed = pack(Surface(flat, ()), 10, BakeSettings(density=1.0))
     # the rows of the frame are all there are: 20 m, begun and ended within a texel
     assert packed.height == 22
     inside = packed.uvs[8:].reshape(-1, 2)

@@ -20,6 +20,7 @@ typedef struct atlas {
     int32_t owners[MOST_TRIANGLES];
     int32_t places[3 * MOST_CHARTS];
     int32_t chart_count, triangle_count, width, height, block;
+    size_t upright;
     double density;
 } atlas;
 
@@ -49,13 +50,14 @@ static void make_charts(atlas *made, uint32_t seed) {
     }
     made->first_triangles[made->chart_count] = made->triangle_count;
     made->block = 1 + (int32_t)(next_random() % 3);
+    made->upright = next_random() % (uint32_t)(made->chart_count + 1);
     made->width = made->block + (int32_t)(next_random() % 300);
     made->density = pow(10.0, 2.0 * uniform() - 1.0);
 }
 
 static pl_status pack(atlas *made) {
     return pl_pack_charts(made->uvs, (size_t)made->triangle_count, made->first_triangles, (size_t)made->chart_count,
-                          made->density, made->width, made->block, made->places, &made->height);
+                          made->upright, made->density, made->width, made->block, made->places, &made->height);
 }
 
 static void place_charts(atlas *made) {
@@ -106,6 +108,8 @@ static void random_charts_keep_apart(void) {
         if (status != PL_OK || made.height > MOST_ROWS)
             continue;
         ++packed;
+        for (int32_t chart = made.chart_count - (int32_t)made.upright; chart < made.chart_count; ++chart)
+            assert(made.places[3 * chart + 2] == 0);
         place_charts(&made);
         check_gutters(&made);
     }
@@ -127,6 +131,9 @@ static void bad_arguments_are_refused(void) {
     made.block = 0;
     assert(pack(&made) == PL_ERR_ARGUMENT);
     made.block = 4;
+    made.upright = (size_t)made.chart_count + 1;
+    assert(pack(&made) == PL_ERR_ARGUMENT);
+    made.upright = 0;
     made.first_triangles[made.chart_count] += 1;
     assert(pack(&made) == PL_ERR_ARGUMENT);
 }
