@@ -120,6 +120,7 @@ def _add_bake(commands):
     size.add_argument("--density", type=float, metavar="TEXELS_PER_M", help="lightmap size by texels per metre")
     add("--keep-uvs", action="store_true", help="use the objects' own 'Lightmap' UV layers instead of unwrapping")
     add("--objects", nargs="+", metavar="NAME", help="bake only these; the others still block and reflect light")
+    add("--apply-modifiers", action="store_true", help="bake objects whose modifiers make faces, and apply these")
     add("--subdivide", type=float, metavar="METRES", help="cut larger faces first (target vertex)")
     add("--patch-size", type=float, metavar="METRES", help="longest edge of a patch (default: by the scene)")
     add("--no-denoise", action="store_true", help="keep Blender's denoiser out of lightmaps")
@@ -173,7 +174,9 @@ def run_bake(args: argparse.Namespace) -> None:
             files.open_blend(args.input)
         progress("read", 0.0)
         with _timed(seconds, "read"):
-            prepared = bake_scene.prepare(bpy.context.scene, settings, args.objects, args.subdivide)
+            prepared = bake_scene.prepare(
+                bpy.context.scene, settings, args.objects, args.subdivide, args.apply_modifiers
+            )
         result = bake(prepared.scene, settings, progress, denoiser_library())
         # from here on Ctrl-C waits until the files are whole: the bake has succeeded and its result is kept
         with _on_ctrl_c(signal.SIG_IGN):

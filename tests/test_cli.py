@@ -217,6 +217,23 @@ def test_a_baked_file_holds_the_vertex_colours(room_blend):
     assert len(mesh.polygons) >= 96
 
 
+def test_modifiers_are_applied_where_that_is_asked_for(room_blend):
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(room_blend))
+    bpy.data.objects["room"].modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
+    bpy.ops.wm.save_mainfile()
+    output = room_blend.with_name("lit.blend")
+    words = ["bake", str(room_blend), "--output", str(output), *QUICK]
+    assert cli.main(words) == 1
+    assert cli.main([*words, "--apply-modifiers"]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(output))
+    room = bpy.data.objects["room"]
+    assert not room.modifiers
+    assert len(room.data.polygons) == 24
+    assert "Lightmap" in room.data.uv_layers
+
+
 def test_a_bake_that_fails_after_opening_keeps_an_older_result(room_blend, capsys):
     older = room_blend.with_name("room_baked.blend")
     older.write_bytes(b"older")

@@ -13,13 +13,12 @@ from .rebuild_mesh import Origins, rebuild_mesh
 MOST_FACES = 20_000_000
 
 
-def cut_mesh(blender_object, matrix: np.ndarray, longest: float) -> bpy.types.Mesh | None:
-    """A copy of the object's mesh with every edge at most ``longest`` [m, world space] long.
+def cut_mesh(mesh, name: str, matrix: np.ndarray, longest: float) -> bpy.types.Mesh | None:
+    """A copy of the mesh of the object ``name`` with every edge at most ``longest`` [m, world space] long.
 
     Returns a new Mesh without users, or None where no edge is longer (or the mesh is not finite: reading it says so).
     Materials, UVs, attributes, sharp edges and flat faces are kept; custom normals and vertex groups are not.
     """
-    mesh = blender_object.data
     positions = read_positions(mesh) @ matrix[:3, :3].T + matrix[:3, 3]
     if not len(mesh.polygons) or not are_finite(positions):
         return None
@@ -28,7 +27,7 @@ def cut_mesh(blender_object, matrix: np.ndarray, longest: float) -> bpy.types.Me
         return None
     quads, triangles = polygons.cut_quads(), polygons.cut_triangles()
     surface = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], triangles])
-    _require_possible(positions[polygons.vertices[surface]], longest, blender_object.name)
+    _require_possible(positions[polygons.vertices[surface]], longest, name)
     sources = np.concatenate([quads, triangles[:, [0, 1, 2, 2]]])
     faces = cut_faces(_first_faces(mesh, positions, polygons.vertices, quads, triangles), longest)
     return rebuild_mesh(mesh, _origins(polygons, faces, sources))

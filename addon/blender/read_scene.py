@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.scene import Scene, SceneError, SceneObject
 from ..core.settings import BakeSettings
+from .new_meshes import NewMeshes
 from .place_mesh import PlacedMesh, place_mesh, unit_normals
 from .read_lights import read_lights
 from .read_materials import Materials
@@ -20,7 +21,7 @@ from .read_mesh import MeshArrays, are_finite, read_mesh
 from .read_world import read_world
 from .rects import in_lightmap, rect_of
 from .shared_meshes import SharedMeshes
-from .targets import why_not_target
+from .targets import has_faces_of, why_not_modified, why_not_target
 from .visibility import Visibility
 
 DEFAULTS = BakeSettings()
@@ -39,14 +40,16 @@ class Warnings:
         return tuple(self._sentences)
 
 
-def read_scene(bpy_scene, settings: BakeSettings = DEFAULTS, object_names=None, mesh_for=None) -> Scene:
+def read_scene(
+    bpy_scene, settings: BakeSettings = DEFAULTS, object_names=None, new_meshes: NewMeshes | None = None
+) -> Scene:
     """Read what a render of ``bpy_scene`` shows.
 
     Parameters
     ----------
     settings : what decides which objects can be baked
     object_names : names of the objects to bake; None = all that can be
-    mesh_for : callable (object, world matrix) -> Mesh or None; a mesh to read in place of a target's own
+    new_meshes : where meshes come from that are read in place of targets' own; None = nowhere
 
     Raises
     ------
@@ -54,7 +57,8 @@ def read_scene(bpy_scene, settings: BakeSettings = DEFAULTS, object_names=None, 
     """
     view_layer = _view_layer(bpy_scene)
     view_layer.update()
-    reading = SceneReading(view_layer, settings, None if object_names is None else set(object_names), mesh_for)
+    wanted = None if object_names is None else set(object_names)
+    reading = SceneReading(view_layer, settings, wanted, new_meshes or NewMeshes())
     reading.read_objects()
     return reading.scene(bpy_scene.world)
 
@@ -70,18 +74,19 @@ class SceneReading:
     view_layer: object
     settings: BakeSettings
     wanted: set[str] | None
-    mesh_for: object
+    new_meshes: NewMeshes
     warn: Warnings = field(default_factory=Warnings)
     placed: list[PlacedMesh] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
-    mesh_names: list[str | None] = field(default_factory=list)  # of the targets
-    is_target: list[bool] = field(default_factory=list)
+    target_meshes: list[str | None] = field(default_factory=list)  # names; None where the object is none to bake
 
     def __post_init__(self):
         self.depsgraph = self.view_layer.depsgraph
         self.visibility = Visibility(self.view_layer)
         self.materials = Materials(self.depsgraph, self.warn)
         self.refusals = {}
+        entries = self.depsgraph.object_instances
+        self.instancers = {entry.parent.original.name for entry in entries if entry.is_instance and entry.parent}
 
     def read_objects(self):
         """Append every mesh entry of the depsgraph that a render shows."""
@@ -128,8 +133,8 @@ class SceneReading:
     def _objects(self):
         firsts = np.cumsum([0] + [len(p.triangles) for p in self.placed])
         return tuple(
-            SceneObject(name, int(first), len(p.triangles), target, mesh=mesh, **p.mesh_arrays())
-            for name, first, target, mesh, p in zip(self.names, firsts, self.is_target, self.mesh_names, self.placed)
+            SceneObject(name, int(first), len(p.triangles), mesh is not None, mesh=mesh, **p.mesh_arrays())
+            for name, first, mesh, p in zip(self.names, firsts, self.target_meshes, self.placed)
         )
 
     def _read_instance(self, instance, name, shared):
@@ -139,13 +144,12 @@ class SceneReading:
         try:
             if not len(mesh.polygons):
                 return
-            target = self._is_wanted(evaluated.original.name) and self._is_target(instance, mesh, shared)
-            replacement = self.mesh_for(evaluated.original, matrix) if target and self.mesh_for else None
-            self._append(name, target, evaluated, replacement or mesh, matrix)
+            target_mesh, new = self._target_mesh(instance, mesh, matrix, shared)
+            self._append(name, target_mesh, evaluated, new or mesh, matrix)
         finally:
             evaluated.to_mesh_clear()
 
-    def _append(self, name, target, evaluated, mesh, matrix):
+    def _append(self, name, target_mesh, evaluated, mesh, matrix):
         rows, layers = self._slot_materials(evaluated, mesh)
         arrays = read_mesh(mesh, layers)
         if not (are_finite(arrays.positions) and are_finite(matrix)):
@@ -154,13 +158,12 @@ class SceneReading:
             return
         materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
         placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
-        if target and self.settings.keep_uvs and placed.lightmap_uvs is not None:
+        if target_mesh and self.settings.keep_uvs and placed.lightmap_uvs is not None:
             in_rect = in_lightmap(placed.lightmap_uvs, rect_of(evaluated.original)).astype(np.float32)
             placed = replace(placed, lightmap_uvs=in_rect)
         self.placed.append(placed)
         self.names.append(name)
-        self.is_target.append(target)
-        self.mesh_names.append(evaluated.original.data.name if target else None)
+        self.target_meshes.append(target_mesh)
 
     def _slot_materials(self, evaluated, mesh):
         """Rows of ``materials`` by material slot, int32 (slots or 1,), and the UV layers that they ask for."""
@@ -186,16 +189,25 @@ class SceneReading:
     def _is_wanted(self, name):
         return self.wanted is None or name in self.wanted
 
-    def _is_target(self, instance, mesh, shared):
-        reason = why_not_target(instance, mesh, shared)
+    def _target_mesh(self, instance, mesh, matrix, shared):
+        """Name of the mesh that the entry's result goes to, None where it gets none; and that mesh if it is new."""
+        blender_object, name = instance.object.original, instance.object.original.name
+        if not self._is_wanted(name):
+            return None, None
+        reason = why_not_target(instance)
+        makes_faces = reason is None and not has_faces_of(mesh, blender_object.data)
+        if makes_faces and (name in self.instancers or not self.new_meshes.applies_modifiers):
+            reason = why_not_modified(blender_object, name in self.instancers)
+        elif reason is None and not makes_faces:
+            reason = shared.why_not(blender_object)
         if reason is None:
-            return True
-        name = instance.object.original.name
+            new = self.new_meshes.mesh_for(instance.object, self.depsgraph, matrix, makes_faces)
+            return (new or blender_object.data).name, new
         # A named object may also be instanced elsewhere: only its own entry has to be bakeable.
         self.refusals.setdefault(name, reason)
         if self.wanted is None:
             self.warn(reason)
-        return False
+        return None, None
 
     def _require_known(self):
         hidden = self.visibility.hidden_names()
@@ -206,7 +218,7 @@ class SceneReading:
                 raise SceneError(f"'{name}' is hidden from renders: it cannot be baked")
 
     def _require_targets(self):
-        targets = {name for name, is_target in zip(self.names, self.is_target) if is_target}
+        targets = {name for name, mesh in zip(self.names, self.target_meshes) if mesh is not None}
         for name in sorted((self.wanted or set()) - targets):
             raise SceneError(self.refusals.get(name, f"'{name}' has no visible faces: it cannot be baked"))
         if not targets:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from .read_mesh import corner_vertices
-from .shared_meshes import SharedMeshes
 
 KINDS = {"CURVE": "a curve", "SURFACE": "a NURBS surface", "META": "a metaball", "FONT": "a text"}
 CONVERT = "convert it to a mesh to bake it"
@@ -18,8 +17,8 @@ KEEPS_FACES = {
 }
 
 
-def why_not_target(instance, mesh, shared: SharedMeshes) -> str | None:
-    """Why no result can be stored on this entry of the depsgraph, or None when it can; ``mesh`` is as evaluated."""
+def why_not_target(instance) -> str | None:
+    """Why no result can be stored on this entry of the depsgraph, whatever its mesh, or None when it can."""
     blender_object = instance.object.original
     name = blender_object.name
     if blender_object.type != "MESH":
@@ -31,9 +30,7 @@ def why_not_target(instance, mesh, shared: SharedMeshes) -> str | None:
         return f"'{name}' is linked from another file: it is not baked; make it local to bake it"
     if data.is_editmode:
         return f"'{name}' is in Edit Mode: it is not baked; leave Edit Mode to bake it"
-    if not _has_faces_of(mesh, data):
-        return _modified(blender_object)
-    return shared.why_not(blender_object)
+    return None
 
 
 def _instanced(instancer, name):
@@ -42,13 +39,15 @@ def _instanced(instancer, name):
     return f"'{name}' is instanced by '{instancer}': its instances are not baked; make them real to bake them"
 
 
-def _has_faces_of(mesh, original):
+def has_faces_of(mesh, original) -> bool:
+    """Whether a mesh as it is evaluated has the faces of the original: a result for one is one for the other."""
     if len(mesh.loops) != len(original.loops) or len(mesh.polygons) != len(original.polygons):
         return False
     return np.array_equal(corner_vertices(mesh), corner_vertices(original))
 
 
-def _modified(blender_object):
+def why_not_modified(blender_object, makes_instances: bool) -> str:
+    """Why an object whose modifiers make new faces is not baked as it is, or with ``makes_instances`` not at all."""
     makers = [
         modifier.name
         for modifier in blender_object.modifiers
@@ -59,7 +58,7 @@ def _modified(blender_object):
             f"'{blender_object.name}' has other faces once evaluated: it is not baked; make it a plain mesh to bake it"
         )
     noun = "modifier" if len(makers) == 1 else "modifiers"
-    return (
-        f"{' and '.join(makers)} {noun} on '{blender_object.name}' makes new faces: "
-        f"it is not baked; apply the {noun} to bake it"
-    )
+    made, remedy = "new faces", f"apply the {noun} to bake it, or bake with Apply Modifiers (--apply-modifiers)"
+    if makes_instances:
+        made, remedy = "new faces and instances", "make its instances real and apply the rest to bake it"
+    return f"{' and '.join(makers)} {noun} on '{blender_object.name}' makes {made}: it is not baked; {remedy}"

@@ -85,9 +85,10 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
         try:
             scene = context.scene
             metres_per_unit = scene.unit_settings.scale_length
-            settings = scene.patchlight.to_settings(metres_per_unit)
-            subdivide = scene.patchlight.subdivide_metres(metres_per_unit)
-            self._prepared = bake_scene.prepare(scene, settings, _names_to_bake(context), subdivide)
+            options = scene.patchlight
+            settings, subdivide = options.to_settings(metres_per_unit), options.subdivide_metres(metres_per_unit)
+            names = _names_to_bake(context)
+            self._prepared = bake_scene.prepare(scene, settings, names, subdivide, options.apply_modifiers)
             library = denoiser_library()
         except EXPECTED_ERRORS as error:
             self.report({"ERROR"}, _sentence(error))

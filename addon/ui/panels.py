@@ -36,6 +36,7 @@ class PATCHLIGHT_PT_bake(_Sidebar, bpy.types.Panel):
             column.prop(options, "smooth_angle")
             _optional(column, options, "use_subdivide", "subdivide")
         column.prop(options, "only_selected")
+        column.prop(options, "apply_modifiers")
 
         layout.separator()
         if state.is_baking:

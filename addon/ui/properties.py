@@ -108,6 +108,10 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
     only_selected: BoolProperty(
         name="Selected Only", description="Bake only selected objects; the others still block and reflect light"
     )
+    apply_modifiers: BoolProperty(
+        name="Apply Modifiers",
+        description="Bake objects whose modifiers make new faces, too, and apply these modifiers",
+    )
     use_subdivide: BoolProperty(
         name="Subdivide", description="Cut large faces before baking: a wall of one face cannot hold a shadow"
     )

@@ -127,6 +127,16 @@ def test_bakes_vertex_colours(room):
     assert all(max(entry.color[:3]) > 0 for entry in colours.data)
 
 
+def test_applies_modifiers_where_that_is_ticked(room):
+    room.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
+    with pytest.raises(RuntimeError, match=r"Subdivision modifier on .* bake with Apply Modifiers"):
+        bpy.ops.patchlight.bake()
+    bpy.context.scene.patchlight.apply_modifiers = True
+    assert bpy.ops.patchlight.bake() == {"FINISHED"}
+    assert not room.modifiers
+    assert "patchlight_lightmap" in room
+
+
 def test_bakes_twice_in_a_row(room):
     assert bpy.ops.patchlight.bake() == {"FINISHED"}
     assert bpy.ops.patchlight.bake() == {"FINISHED"}
