@@ -87,12 +87,12 @@ def gather_irradiance(
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
     started = time.perf_counter()
     job = GatherJob(kernel, solved, receivers, grid.shown, no_guides(len(receivers)))
-    job, direct, direct_rms, rays = _first_looks(job, grid, error, seed, within(on_step, 0.0, 0.4))
+    job, direct, rays = _first_looks(job, grid, error, seed, within(on_step, 0.0, 0.4))
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     job = replace(job, guides=guides)
     pace = (rays["direct"] + rays["gather"] + learning) / (time.perf_counter() - started)
     passes = within(on_step, 0.4, 0.6)
-    gathered = gather_until(job, grid, direct, direct_rms, denoise, error, seed, pace, seconds_left, passes)
+    gathered = gather_until(job, grid, direct, denoise, error, seed, pace, seconds_left, passes)
     at_points = measure(job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
     # relative to what is there, not to what is shown: light that leaks into the dark has to count as all wrong
     scale = scale_of_luminance(at_points.luminance)
@@ -104,12 +104,12 @@ def gather_irradiance(
 
 
 def _first_looks(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed, on_step):
-    """The job whose rays see about what is there, direct light (N, 3) and its relative error, and the rays of both."""
+    """The job whose rays see about what is there, direct light as it is stored, and the rays of both."""
     direct, look, rays = _direct_and_look(job, grid, error, seed, within(on_step, 0.0, 0.875))
     if grid.is_image:
         job, further = _with_texel_light(job, grid, direct.values, look, seed + 2, within(on_step, 0.875, 0.125))
         rays += further
-    return job, grid.stored(direct.values), direct.rms, {"direct": direct.rays, "gather": rays}
+    return job, replace(direct, values=grid.stored(direct.values)), {"direct": direct.rays, "gather": rays}
 
 
 def _direct_and_look(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed, on_step):

@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from .allocation import measured_errors, next_pass, rays_due
 from .denoising import denoised, needs_denoising
+from .direct_light import DirectLight
 from .gather_job import REPLICATES, GatherJob
 from .gather_sums import no_sums
 from .measuring import probes_among
@@ -107,8 +109,7 @@ class _Found:
 def gather_until(
     job: GatherJob,
     grid: TexelGrid | VertexGraph,
-    direct,
-    direct_rms: float,
+    direct: DirectLight,
     denoise: Callable | None,
     error,
     seed,
@@ -123,8 +124,7 @@ def gather_until(
     Parameters
     ----------
     grid, denoise, error, seconds_left : as in gather.gather_irradiance
-    direct : float32 (N, 3) direct light at the job's receivers
-    direct_rms : its relative error, as it states
+    direct : what it is at the job's receivers; its values are those that are stored
     pace : rays that were traced in a second before
     """
     count, started = len(job.receivers), time.perf_counter()
@@ -143,12 +143,12 @@ def gather_until(
         begin += width
         del active, further
         budget = budget or ray_budget(samples.rays * budgeted / first, error)
-        scales = _show_what_was_gathered(job, grid, samples, direct)
+        scales = _show_what_was_gathered(job, grid, samples, direct.values)
         probes = probes or probes_among(job, grid, error, seed + 1)
-        found = _best_estimate(job, grid, samples, scales, direct, probes)
+        found = _best_estimate(job, grid, samples, scales, direct.values, probes)
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
-            found, aim = _denoised(denoise, grid, found, samples, direct, probes), min(aim, AIM)
+            found, aim = _denoised(denoise, job, grid, found, samples, direct, probes), min(aim, AIM)
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
         if rms <= error and not is_first:
@@ -156,14 +156,14 @@ def gather_until(
         elif idle == MOST_IDLE:
             stopped = "as further rays no longer help"
         else:
-            due = _due(found, samples, probes, error, aim, direct_rms)
+            due = _due(found, samples, probes, error, aim, direct.rms)
             in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
             active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
             del due
         is_first = False
         if stopped is not None:
             if not is_asked and needs_denoising(found.rms, error):
-                found = _denoised(denoise, grid, found, samples, direct, probes)
+                found = _denoised(denoise, job, grid, found, samples, direct, probes)
             traced = samples.rays, probes.measured.rays
             return Gathered(found.values, found.rms, stopped, found.is_denoised, *traced)
         del found, scales  # a fine lightmap's are a gigabyte, which the next estimate needs
@@ -211,11 +211,14 @@ def _best_estimate(job: GatherJob, grid, samples: _Samples, scales, direct, prob
     return found_by(grid.stored(samples.light), noise)
 
 
-def _denoised(denoise, grid, found: _Found, samples: _Samples, direct, probes: Probes) -> _Found:
+def _denoised(denoise, job, grid, found: _Found, samples: _Samples, direct: DirectLight, probes: Probes) -> _Found:
     """What the denoiser makes of it, where there is one and the probes find it better."""
     if denoise is None or not grid.is_image:
         return found
-    values = denoised(denoise, grid, found.values, direct, samples.light, probes.receivers, probes.measured)
+    noise = np.square(found.noise) / job.weights + np.minimum(direct.variance / scale_of(found.values) ** 2, 1)
+    pooled = partial(grid.pooled, job.kernel.workers, job.receivers)
+    light = found.values, noise, direct.values, samples.light
+    values = denoised(denoise, grid, *light, pooled, probes.receivers, probes.measured)
     other = replace(found, values=values, squares=probes.squares_of(values), is_denoised=True)
     return min(found, other, key=lambda estimate: estimate.rms)
 

@@ -75,6 +75,10 @@ def test_why_there_is_none(settings, library, why):
         assert why in reason
 
 
+def as_they_are(values):
+    return values
+
+
 def test_two_estimates_are_mixed_where_the_probes_find_each_better():
     rng = np.random.default_rng(0)
     truth, count = np.ones((4096, 3)), 4096
@@ -83,8 +87,25 @@ def test_two_estimates_are_mixed_where_the_probes_find_each_better():
     first[:2048] += 0.1
     second[2048:] += 0.5 + 0.1 * rng.random((2048, 1))
     chosen = np.arange(0, count, 2)
-    found = mixed(first, second, chosen, Measured(np.ones(len(chosen)), np.zeros(len(chosen)), 0))
+    noise = np.full(count, 0.01, np.float32)
+    found = mixed(first, second, noise, as_they_are, chosen, Measured(np.ones(len(chosen)), np.zeros(len(chosen)), 0))
     # luminance weights sum to 1 within float32
+    assert np.abs(found - truth).max() < 1e-4
+
+
+def test_noise_goes_where_it_is_as_stated_and_details_of_its_size_stay():
+    rng = np.random.default_rng(1)
+    truth = np.ones((1 << 14, 3))
+    is_noisy = np.arange(len(truth)) % 2 == 0
+    step = 0.1 * rng.choice((-1.0, 1.0), (len(truth), 1))
+    # noise of 0.1 that the second has not, and details of 0.1 that it has painted over, where nothing is noisy
+    truth[~is_noisy] += step[~is_noisy]
+    first, second = truth.copy(), np.ones_like(truth)
+    first[is_noisy] += step[is_noisy]
+    noise = np.where(is_noisy, 0.01, 1e-6).astype(np.float32)
+    chosen = np.arange(0, len(truth), 7)
+    probes = Measured(truth[chosen, 0], np.zeros(len(chosen)), 0)
+    found = mixed(first, second, noise, as_they_are, chosen, probes)
     assert np.abs(found - truth).max() < 1e-4
 
 
@@ -118,7 +139,9 @@ def test_texels_without_gathered_light_and_what_is_no_number_stay_as_they_were()
     painted[1, 1] = np.nan
     chosen = np.arange(4)
     probes = Measured(np.full(4, 0.9), np.zeros(4), 0)
-    found = denoised(lambda image: painted, grid, direct + gathered, direct, gathered, chosen, probes)
+    noise = np.ones(4, np.float32)
+    light = direct + gathered, noise, direct, gathered
+    found = denoised(lambda image: painted, grid, *light, as_they_are, chosen, probes)
     assert (found[:2] == direct[:2]).all()
     assert found[2] == pytest.approx(0.9)
     assert (found[3] == (direct + gathered)[3]).all()
@@ -128,7 +151,8 @@ def test_a_denoiser_that_fails_changes_nothing():
     grid, direct, gathered = four_texels()
     values = direct + gathered
     probes = Measured(np.ones(4), np.zeros(4), 0)
-    assert denoised(lambda image: None, grid, values, direct, gathered, np.arange(4), probes) is values
+    light = values, np.ones(4, np.float32), direct, gathered
+    assert denoised(lambda image: None, grid, *light, as_they_are, np.arange(4), probes) is values
 
 
 def test_it_can_be_cancelled_while_it_works(library):
