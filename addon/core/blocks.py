@@ -13,6 +13,7 @@ from .copies import Layout
 
 CHART_START = 0.504  # PL_CHART_START of the kernel: where a chart starts in its first texel
 CHART_MARGIN = 3  # texels that a chart takes beyond its size, with its gutter
+MOST_STEPS = 2048  # across an atlas; a wider one is packed in steps of several texels
 WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)  # of the square's
 MOST_HALVINGS = 12
 ROUNDING = 1e-6
@@ -71,16 +72,25 @@ def _least_share(layout, density):
 
 
 def _packed(flat: FlatCharts, density, width):
-    places, _ = kernel.pack_charts(flat.uvs, flat.first_triangles, density, width, 1)
-    return placed(flat, density, places, 1) - CHART_START
+    places, _, _, step = pack_charts(flat, density, width)
+    return placed(flat, density, places, step) - CHART_START
 
 
-def placed(flat: FlatCharts, density: float, places: np.ndarray, block: int) -> np.ndarray:
-    """Corners of charts (N, 3, 2) at the places (C, 3) that the kernel's packer gave them [texels]."""
+def pack_charts(flat: FlatCharts, density: float, width: int, upright: int = 0):
+    """Charts in an atlas of about ``width`` texels, by the kernel's packer: places (C, 3), then width, height, and the
+    step of the places [texels]."""
+    step = -(-width // MOST_STEPS)
+    width = -(-width // step) * step
+    places, height = kernel.pack_charts(flat.uvs, flat.first_triangles, density, width, step, upright)
+    return places, width, height, step
+
+
+def placed(flat: FlatCharts, density: float, places: np.ndarray, step: int) -> np.ndarray:
+    """Corners of charts (N, 3, 2) at the places that ``pack_charts`` gave them [texels]."""
     places = places[flat.chart_of_row]
     uvs = flat.uvs * density
     uvs = np.where(places[:, 2, None, None] == 1, uvs[..., ::-1], uvs)
-    return uvs + (places[:, None, :2] * block + CHART_START)
+    return uvs + (places[:, None, :2] * step + CHART_START)
 
 
 def _extent(uvs):

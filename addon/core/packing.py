@@ -12,14 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import kernel
-from .blocks import CHART_MARGIN, CHART_START, Block, pack_block, placed
+from .blocks import CHART_MARGIN, CHART_START, MOST_STEPS, Block, pack_block, pack_charts, placed
 from .charts import Charts, FlatCharts
 from .copies import Layout
 from .settings import BakeSettings, SettingsError
 
 MOST_TEXELS = 1 << 28
-MOST_BLOCKS = 2048  # across the atlas; wider ones are packed in blocks of several texels
 FULL_ENOUGH = 0.985  # of the texels asked for
 ATTEMPTS = 8
 WIDTHS = (0.71, 0.84, 1.19, 1.41)  # other widths than the square's, where large charts leave gaps
@@ -57,17 +55,17 @@ class Surface:
 class Packing:
     """One try, at a density [texels/m].
 
-    ``places`` int32 in blocks of so many texels (column, row, is turned): of the charts, then of each layout's objects,
-    whose ``layout_blocks`` say how large they are. ``longest`` is the longest side of all of these [texels].
+    ``places`` int32 in steps of so many texels (column, row, is turned): of the charts, then of each layout's objects,
+    whose ``blocks`` say how large they are. ``longest`` is the longest side of all of these [texels].
     """
 
-    places: np.ndarray
     density: float
+    places: np.ndarray
     width: int
     height: int
-    block: int
+    step: int
     longest: float
-    layout_blocks: tuple[Block, ...]
+    blocks: tuple[Block, ...]
 
     @property
     def texels(self) -> int:
@@ -103,7 +101,7 @@ def _pack_into(surface, texels):
     best = _densest(surface, texels, width, math.sqrt(0.7 * texels / surface.area))
     if best.longest < LARGE_CHART * width:
         return best
-    if surface.chart_count <= FEW_CHARTS and width <= MOST_BLOCKS:
+    if surface.chart_count <= FEW_CHARTS and width <= MOST_STEPS:
         others = [_densest(surface, texels, round(width * factor), best.density) for factor in FINE_WIDTHS]
         return max([best, *others], key=lambda packing: packing.density)
     others = [_pack_once(surface, best.density, round(width * factor)) for factor in WIDTHS]
@@ -152,15 +150,12 @@ def _loosest(surface, texels, width, density):
 
 
 def _pack_once(surface, density, width):
-    boxes, layout_blocks = _boxes(surface, density)
+    boxes, blocks = _boxes(surface, density)
     longest = boxes.sizes.max() * density
     width = max(width, min(math.ceil(longest + CHART_MARGIN), MOST_TEXELS))
-    block = -(-width // MOST_BLOCKS)
-    width = width // block * block if width % block == 0 else (width // block + 1) * block
     # a rectangle of UVs (scale, offset) cannot turn what lies in it
     upright = boxes.chart_count - surface.flat.chart_count
-    places, height = kernel.pack_charts(boxes.uvs, boxes.first_triangles, density, width, block, upright)
-    return Packing(places, density, width, height, block, longest, layout_blocks)
+    return Packing(density, *pack_charts(boxes, density, width, upright), longest, blocks)
 
 
 def _boxes(surface, density):
@@ -181,10 +176,10 @@ def _charts(surface, triangle_count, packing):
     flat = surface.flat
     uvs = np.full((triangle_count, 3, 2), np.nan, np.float32)
     charts = np.full(triangle_count, -1, np.int32)
-    uvs[flat.triangles] = placed(flat, packing.density, packing.places[: flat.chart_count], packing.block)
+    uvs[flat.triangles] = placed(flat, packing.density, packing.places[: flat.chart_count], packing.step)
     charts[flat.triangles] = flat.chart_of_row
-    count, rects, offsets = flat.chart_count, {}, packing.places[flat.chart_count :, :2] * packing.block + CHART_START
-    for layout, block in zip(surface.layouts, packing.layout_blocks):
+    count, rects, offsets = flat.chart_count, {}, packing.places[flat.chart_count :, :2] * packing.step + CHART_START
+    for layout, block in zip(surface.layouts, packing.blocks):
         own_offsets, offsets = np.split(offsets, [len(layout.objects)])
         for obj, scale, offset in zip(layout.objects, block.scales, own_offsets):
             own_uvs, own_charts = layout.spread(block.uvs, obj)
