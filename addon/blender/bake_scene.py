@@ -6,7 +6,6 @@ checks everything that it needs before it changes anything.
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import dataclass, replace
 
 import bpy
@@ -17,7 +16,7 @@ from ..core.settings import BakeSettings, SettingsError
 from ..core.sound_faces import sound_faces
 from .new_meshes import NewMeshes, give_mesh
 from .read_scene import read_scene
-from .write_lightmap import require_layer_room, write_lightmap
+from .write_lightmap import lightmap_image, require_layer_room, write_lightmap
 from .write_vertex_colours import write_vertex_colours
 
 
@@ -87,9 +86,12 @@ def write(prepared: PreparedBake, result) -> None:
         for name, mesh in meshes.items():
             require_layer_room(name, mesh)
         if not prepared.settings.keep_uvs:
-            _require_own_places(meshes, result.lightmap.rects)
+            _require_same_sharing(prepared.targets, meshes)
     else:
         _require_complete(prepared, result.corner_colours, "colours")
+    image = None
+    if prepared.settings.target == "lightmap":  # first what needs most memory
+        image = lightmap_image(prepared.targets, result.lightmap.pixels)
     for name in prepared.new_meshes.names:
         blender_object = bpy.data.objects[(name, None)]
         give_mesh(blender_object, meshes[name])
@@ -97,7 +99,7 @@ def write(prepared: PreparedBake, result) -> None:
             if modifier in blender_object.modifiers:
                 blender_object.modifiers.remove(blender_object.modifiers[modifier])
     if prepared.settings.target == "lightmap":
-        write_lightmap(prepared.targets, result.lightmap, prepared.settings.keep_uvs)
+        write_lightmap(prepared.targets, result.lightmap, image, prepared.settings.keep_uvs)
     else:
         write_vertex_colours(prepared.targets, result.corner_colours)
 
@@ -138,12 +140,12 @@ def _checked_mesh(prepared, name):
     return mesh
 
 
-def _require_own_places(meshes, rects):
+def _require_same_sharing(targets, meshes):
     """Objects that have come to share a mesh since it was read would write over each other's UVs."""
-    users = Counter(mesh.name for mesh in meshes.values())
-    for name, mesh in meshes.items():
-        if users[mesh.name] > 1 and name not in rects:
-            raise SceneError(f"'{name}' came to share its mesh during the bake: nothing has been written")
+    read_as = {}
+    for target in targets:
+        if read_as.setdefault(meshes[target.name].name, target.mesh) != target.mesh:
+            raise SceneError(f"'{target.name}' came to share its mesh during the bake: nothing has been written")
 
 
 def _require_finite(what, values):

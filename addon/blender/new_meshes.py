@@ -5,6 +5,9 @@ They are made while the scene is read; no object has them before the bake has su
 
 from __future__ import annotations
 
+import hashlib
+from uuid import uuid4
+
 import bpy
 import numpy as np
 
@@ -12,8 +15,8 @@ from .cut_mesh import cut_mesh
 from .read_mesh import corner_vertices
 from .rebuild_mesh import VALUES
 
-# What these do is not in the object's mesh: they stay on when all others are applied.
-STAY_ON = {"COLLISION", "DYNAMIC_PAINT", "FLUID", "PARTICLE_SYSTEM"}
+# What these do is not in the object's mesh, but for a fluid's domain: they stay on when all others are applied.
+STAY_ON = {"COLLISION", "DYNAMIC_PAINT", "FLUID", "PARTICLE_SYSTEM", "SURFACE"}
 
 
 class NewMeshes:
@@ -29,16 +32,15 @@ class NewMeshes:
     ----------
     names : of the new meshes, by the objects' names
     modifiers : names of the modifiers that are in them, by the objects' names
-    warnings : sentences for the report
     """
 
     def __init__(self, applies_modifiers: bool = False, longest: float | None = None, shares: bool = True):
         self.names: dict[str, str] = {}
         self.modifiers: dict[str, tuple[str, ...]] = {}
-        self.warnings: list[str] = []
+        self._said: dict[str, list[str]] = {}  # by the objects' names
         self.applies_modifiers = applies_modifiers
         self._longest, self._shares = longest, shares
-        self._applied: dict[str, list[str]] = {}  # names of new meshes by what they are made of
+        self._applied: dict[tuple, str] = {}  # names of new meshes by what is in them
 
     def mesh_for(self, evaluated, depsgraph, matrix: np.ndarray, makes_faces: bool) -> bpy.types.Mesh | None:
         """The mesh to read in place of the object's, or None where that is read.
@@ -51,11 +53,25 @@ class NewMeshes:
         if self.applies_modifiers and (makes_faces or (is_modified and self._longest)):
             mesh = self._apply(evaluated, depsgraph)
         elif is_modified and self._longest:
-            self.warnings.append(f"'{name}' has modifiers or shape keys: it is not subdivided")
+            self._say(name, "has modifiers or shape keys: it is not subdivided")
             return None
         if self._longest:
             self._cut(name, mesh, matrix)
         return bpy.data.meshes[(self.names[name], None)] if name in self.names else None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences for the report."""
+        return tuple(f"'{name}' {said}" for name, all_said in self._said.items() for said in all_said)
+
+    def forget(self, object_name: str) -> None:
+        """The object is not to be baked after all."""
+        name = self.names.pop(object_name, None)
+        self.modifiers.pop(object_name, None)
+        self._said.pop(object_name, None)
+        if name is not None and name not in self.names.values():
+            self._applied = {content: made for content, made in self._applied.items() if made != name}
+            _remove_unused(name)
 
     def remove(self) -> None:
         """Free those that no object has."""
@@ -67,27 +83,30 @@ class NewMeshes:
         blender_object, name = evaluated.original, evaluated.original.name
         mesh = bpy.data.meshes.new_from_object(evaluated, preserve_all_data_layers=True, depsgraph=depsgraph)
         self.names[name] = mesh.name
-        modifiers = [m for m in blender_object.modifiers if m.show_viewport and m.type not in STAY_ON]
+        for key in blender_object.data.keys():
+            mesh[key] = blender_object.data[key]
+        modifiers = [m for m in blender_object.modifiers if m.show_viewport and not _stays_on(m)]
         self.modifiers[name] = tuple(modifier.name for modifier in modifiers)
-        parts = [*self.modifiers[name], *(["shape keys"] if blender_object.data.shape_keys else [])]
-        self.warnings.append(f"'{name}': the bake has applied {' and '.join(parts) or 'what makes its faces'}")
-        if not self._shares:
+        parts = [*map(_described, modifiers), *(["shape keys"] if blender_object.data.shape_keys else [])]
+        self._say(name, f"has had {' and '.join(parts) or 'what makes its faces'} applied by the bake")
+        content = (blender_object.data.name, _content(mesh)) if self._shares else None
+        if content not in self._applied:
+            if self._shares:
+                self._applied[content] = mesh.name
             return mesh
-        made = self._applied.setdefault(blender_object.data.name, [])
-        for other in made:
-            if _are_same(mesh, bpy.data.meshes[(other, None)]):
-                self.names[name] = other
-                bpy.data.meshes.remove(mesh)
-                return bpy.data.meshes[(other, None)]
-        made.append(mesh.name)
-        return mesh
+        self.names[name] = self._applied[content]
+        bpy.data.meshes.remove(mesh)
+        return bpy.data.meshes[(self.names[name], None)]
+
+    def _say(self, name, what):
+        self._said.setdefault(name, []).append(what)
 
     def _cut(self, name, mesh, matrix):
         cut = cut_mesh(mesh, name, matrix, self._longest)
         if cut is None:
             return
         if mesh.has_custom_normals:
-            self.warnings.append(f"'{name}' is subdivided: its custom normals are lost")
+            self._say(name, "is subdivided: its custom normals are lost")
         whole, self.names[name] = self.names.get(name), cut.name
         if whole is not None:
             _remove_unused(whole)
@@ -109,23 +128,33 @@ def _remove_unused(name):
         bpy.data.meshes.remove(mesh)
 
 
-def _are_same(mesh, other):
-    """Whether two meshes have the same faces, materials and attributes; what cannot be compared differs."""
-    if list(mesh.materials) != list(other.materials) or len(mesh.polygons) != len(other.polygons):
-        return False
-    own, others = ([a for a in each.attributes if not a.name.startswith(".")] for each in (mesh, other))
-    kinds = [[(a.name, a.domain, a.data_type) for a in attributes] for attributes in (own, others)]
-    if kinds[0] != kinds[1] or any(data_type not in VALUES for _, _, data_type in kinds[0]):
-        return False
-    return (
-        np.array_equal(_values(mesh.polygons, "loop_start"), _values(other.polygons, "loop_start"))
-        and np.array_equal(corner_vertices(mesh), corner_vertices(other))
-        and all(np.array_equal(_attribute_values(a), _attribute_values(b)) for a, b in zip(own, others))
-    )
+def _stays_on(modifier):
+    return modifier.type in STAY_ON and getattr(modifier, "fluid_type", "") != "DOMAIN"
+
+
+def _described(modifier):
+    """The modifier's name, and its level where a render would show another one than the viewport, which is applied."""
+    levels = [getattr(modifier, name, None) for name in ("levels", "render_levels")]
+    if levels[0] == levels[1]:
+        return modifier.name
+    return f"{modifier.name} (as the viewport has it, at level {levels[0]} of {levels[1]})"
+
+
+def _content(mesh):
+    """Faces, materials and attributes of a mesh as a digest, the same for two meshes only if these are."""
+    digest = hashlib.sha256()
+    own = [attribute for attribute in mesh.attributes if not attribute.name.startswith(".")]
+    kinds = [(attribute.name, attribute.domain, attribute.data_type) for attribute in own]
+    digest.update(repr(([material and material.name_full for material in mesh.materials], kinds)).encode())
+    for values in (_values(mesh.polygons, "loop_start"), corner_vertices(mesh), *map(_attribute_values, own)):
+        digest.update(values.tobytes())
+    return digest.hexdigest()
 
 
 def _attribute_values(attribute):
-    return _values(attribute.data, *VALUES[attribute.data_type][:3])
+    # what cannot be read is of unknown content, the same as none
+    known = VALUES.get(attribute.data_type)
+    return np.frombuffer(uuid4().bytes, np.uint8) if known is None else _values(attribute.data, *known[:3])
 
 
 def _values(items, name, width=1, dtype=np.int32):

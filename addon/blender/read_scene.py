@@ -20,7 +20,7 @@ from .read_materials import Materials
 from .read_mesh import MeshArrays, are_finite, read_mesh
 from .read_world import read_world
 from .rects import in_lightmap, rect_of
-from .shared_meshes import SharedMeshes
+from .shared_meshes import SharedMeshes, why_not_without
 from .targets import has_faces_of, why_not_modified, why_not_target
 from .visibility import Visibility
 
@@ -91,7 +91,7 @@ class SceneReading:
     def read_objects(self):
         """Append every mesh entry of the depsgraph that a render shows."""
         self._require_known()
-        shared = SharedMeshes(self.depsgraph, self.settings, self.wanted)
+        shared = SharedMeshes(self.depsgraph, self.settings)
         entries = Counter()
         # The iterator's objects are temporary: nothing of them is kept past its turn of the loop. Curves and their
         # like come twice, as themselves and as meshes; only the meshes are taken.
@@ -102,6 +102,7 @@ class SceneReading:
             number, entries[name] = entries[name], entries[name] + 1
             if self.visibility.shows(instance):
                 self._read_instance(instance, f"{name}#{number}" if instance.is_instance else name, shared)
+        self._spare_other_lightmaps(shared)
         self._require_targets()
         for name in self.visibility.viewport_hidden_names():
             self.warn(f"'{name}' is hidden in the viewport: the bake does not see it")
@@ -155,6 +156,7 @@ class SceneReading:
         if not (are_finite(arrays.positions) and are_finite(matrix)):
             self.refusals[name] = f"'{name}' has vertices that are not finite (NaN or infinite): it is left out"
             self.warn(self.refusals[name])
+            self.new_meshes.forget(name)
             return
         materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
         placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
@@ -198,16 +200,28 @@ class SceneReading:
         makes_faces = reason is None and not has_faces_of(mesh, blender_object.data)
         if makes_faces and (name in self.instancers or not self.new_meshes.applies_modifiers):
             reason = why_not_modified(blender_object, name in self.instancers)
-        elif reason is None and not makes_faces:
+        elif reason is None and (self.settings.keep_uvs or not makes_faces):
             reason = shared.why_not(blender_object)
         if reason is None:
             new = self.new_meshes.mesh_for(instance.object, self.depsgraph, matrix, makes_faces)
             return (new or blender_object.data).name, new
+        self._refuse(name, reason)
+        return None, None
+
+    def _refuse(self, name, reason):
         # A named object may also be instanced elsewhere: only its own entry has to be bakeable.
         self.refusals.setdefault(name, reason)
         if self.wanted is None:
             self.warn(reason)
-        return None, None
+
+    def _spare_other_lightmaps(self, shared):
+        """Make those no targets whose mesh's new UVs would spoil the lightmap of one that is none."""
+        targets = {name for name, mesh in zip(self.names, self.target_meshes) if mesh is not None}
+        for row, (name, mesh) in enumerate(zip(self.names, self.target_meshes)):
+            spoilt = None if mesh is None else shared.spoilt(mesh, targets)
+            if spoilt is not None:
+                self.target_meshes[row] = None
+                self._refuse(name, why_not_without(name, mesh, spoilt))
 
     def _require_known(self):
         hidden = self.visibility.hidden_names()

@@ -21,7 +21,8 @@ def rect_of(blender_object) -> np.ndarray:
     except (TypeError, ValueError):
         rect = np.zeros(0)
     if rect.shape != (4,) or not np.isfinite(rect).all():
-        raise SceneError(f"'{blender_object.name}': its custom property {RECT_PROPERTY} is not four numbers")
+        name = f"'{blender_object.name}'"
+        raise SceneError(f"{name}: its custom property {RECT_PROPERTY} is not four numbers: delete it, or unwrap anew")
     return rect
 
 

@@ -20,11 +20,14 @@ def require_layer_room(name, mesh) -> None:
         raise SceneError(f"'{name}' already has {MOST_LAYERS} UV maps: remove one to make room for '{LIGHTMAP_LAYER}'")
 
 
-def write_lightmap(targets, lightmap, keeps_uvs: bool) -> None:
-    """Store the image, and the UVs unless they are kept. ``lightmap.pixels`` hold E / pi, float32 (H, W, 3), row 0 at
-    v = 0."""
+def lightmap_image(targets, pixels) -> bpy.types.Image:
+    """The packed image of E / pi, float32 (H, W, 3), row 0 at v = 0; no object points to a new one yet."""
+    return _image_for([bpy.data.objects[(target.name, None)] for target in targets], pixels)
+
+
+def write_lightmap(targets, lightmap, image, keeps_uvs: bool) -> None:
+    """Point the objects to the image, and store the UVs unless they are kept."""
     objects = [bpy.data.objects[(target.name, None)] for target in targets]
-    image = _image_for(objects, lightmap.pixels)
     if not keeps_uvs:
         _write_uvs(targets, objects, lightmap)
     for blender_object in objects:
@@ -36,12 +39,13 @@ def _write_uvs(targets, objects, lightmap):
     by_mesh = {}
     for target, blender_object in zip(targets, objects):
         mesh, uvs = blender_object.data, lightmap.uvs[target.span]
-        rect = lightmap.rects.get(target.name)
-        set_rect(blender_object, rect)
+        rect = lightmap.rects.get(target.name, WHOLE)
+        # where some have one all do: a material that several objects have reads 0 where there is none
+        set_rect(blender_object, rect if lightmap.rects else None)
         has_place = np.isfinite(uvs).all(axis=(1, 2))  # a triangle without area may have none
         if mesh.name not in by_mesh:
             by_mesh[mesh.name] = np.zeros((len(mesh.loops), 2), np.float32)
-        own = in_mesh(uvs[has_place], np.array(rect or WHOLE))
+        own = in_mesh(uvs[has_place], np.array(rect))
         by_mesh[mesh.name][target.corners[has_place]] = own
     for name, values in by_mesh.items():
         mesh = bpy.data.meshes[(name, None)]

@@ -17,6 +17,7 @@ MOST_STEPS = 2048  # across an atlas; a wider one is packed in steps of several 
 WIDTHS = (0.71, 0.84, 1.0, 1.19, 1.41)  # of the square's
 MOST_HALVINGS = 12
 ROUNDING = 1e-6
+LONG = 0.1  # of its texels does a block cost more for each e times that it is longer than wide
 LEAST_GROWTH = 1.5  # that leaves a free texel between charts 2 apart, wherever the texels' middles fall
 
 
@@ -48,8 +49,13 @@ def pack_block(layout: Layout, density: float) -> Block:
     sides = flat.sizes * (density * share) + CHART_MARGIN
     square = math.sqrt(sides.prod(axis=1).sum())
     tries = (_packed(flat, density * share, math.ceil(max(square * width, sides.max()))) for width in WIDTHS)
-    uvs = min(tries, key=lambda uvs: _extent(uvs).prod())
+    uvs = min(tries, key=lambda uvs: _cost(*_extent(uvs)))
     return Block(uvs, _extent(uvs), _scales(layout, share))
+
+
+def _cost(width, height):
+    """Texels of a block, and more for a long one: a few of these leave an atlas empty."""
+    return width * height * (1 + LONG * abs(math.log(max(width, 1) / max(height, 1))))
 
 
 def _scales(layout, share):
@@ -64,8 +70,10 @@ def _least_share(layout, density):
     than it saves, where the smallest has hardly a texel a chart.
     """
 
+    sizes = layout.flat.sizes * density
+
     def texels(share):
-        block = (layout.flat.sizes * (density * share) + CHART_MARGIN).prod(axis=1).sum()
+        block = (sizes * share + CHART_MARGIN).prod(axis=1).sum()
         return block * _scales(layout, share).prod(axis=1).sum()
 
     return min((0.5**halvings for halvings in range(MOST_HALVINGS)), key=texels)

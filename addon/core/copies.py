@@ -29,13 +29,18 @@ class Layout:
     flat: FlatCharts
     factors: np.ndarray
 
+    @property
+    def loops(self) -> np.ndarray:
+        """The face corners of ``flat``'s rows, int32 (N, 3)."""
+        return self.objects[0].corners[self.flat.triangles - self.objects[0].first]
+
     def spread(self, uvs: np.ndarray, obj: SceneObject):
         """UVs of ``flat``'s rows (N, 3, 2) as an object's own triangles have them, and the chart of each of these."""
-        model, rows = self.objects[0], self.flat.triangles - self.objects[0].first
-        of_loop = np.full((_count(self.objects, "corners"), 2), np.nan)
-        of_loop[model.corners[rows]] = uvs
-        of_polygon = np.full(_count(self.objects, "polygons"), -1, np.int32)
-        of_polygon[model.polygons[rows]] = self.flat.chart_of_row
+        model = self.objects[0]  # whose corners and polygons are all that the others have
+        of_loop = np.full((int(model.corners.max()) + 1, 2), np.nan)
+        of_loop[self.loops] = uvs
+        of_polygon = np.full(int(model.polygons.max()) + 1, -1, np.int32)
+        of_polygon[model.polygons[self.flat.triangles - model.first]] = self.flat.chart_of_row
         return of_loop[obj.corners], of_polygon[obj.polygons]
 
 
@@ -68,7 +73,7 @@ def layouts(scene: Scene, flat: FlatCharts, groups) -> tuple[FlatCharts, tuple[L
 def _model_first(scene, group):
     areas = [_area(_corners(scene, obj)) for obj in group]
     model = max(range(len(group)), key=lambda k: (group[k].count, areas[k], -k))
-    is_known = np.zeros(_count(group, "corners"), bool)
+    is_known = np.zeros(max(int(obj.corners.max()) for obj in group) + 1, bool)
     is_known[group[model].corners] = True
     for obj in group:
         if not is_known[obj.corners].all():
@@ -99,9 +104,9 @@ def _layout(scene, flat, group):
 def _stretch(scene, layout, obj):
     """How long an object's surface is along u and v of each chart, of the layout's: RMS by area, above 0 (C, 2)."""
     flat = layout.flat
-    positions = np.full((_count(layout.objects, "corners"), 3), np.nan)
+    positions = np.full((int(layout.objects[0].corners.max()) + 1, 3), np.nan)
     positions[obj.corners] = _corners(scene, obj)
-    corners = positions[layout.objects[0].corners[flat.triangles - layout.objects[0].first]]
+    corners = positions[layout.loops]
     edges, along = corners[:, 1:] - corners[:, :1], flat.uvs[:, 1:] - flat.uvs[:, :1]
     twice_area = along[:, 0, 0] * along[:, 1, 1] - along[:, 0, 1] * along[:, 1, 0]
     charts = flat.chart_of_row
@@ -114,10 +119,6 @@ def _stretch(scene, layout, obj):
         sums = np.bincount(charts[is_sure], squares, flat.chart_count)
         out[:, axis] = sums / np.maximum(np.bincount(charts, np.abs(twice_area), flat.chart_count), 1e-300)
     return np.maximum(np.sqrt(out), 1e-9)
-
-
-def _count(objects, name):
-    return max(int(getattr(obj, name).max()) for obj in objects) + 1
 
 
 def _corners(scene, obj):

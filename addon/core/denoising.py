@@ -15,10 +15,8 @@ from .probes import Measured
 from .relative import scale_of
 from .smoothing import TexelGrid
 
-DOUBTS = 8  # groups by how far the estimates are apart for their noise, of as many probes,
-LEAST_PROBES = (
-    128  # and of no fewer than so many; where there are twice these, each is parted again by the noise itself
-)
+DOUBTS = 8  # groups by how far the estimates are apart for their noise, of as many probes each,
+LEAST_PROBES = 128  # and of no fewer; where there are twice as many, each is parted again by the noise itself
 LEAST_NOISE = 1e-12  # as a relative variance: a division by 0 less
 NEEDED = 0.125  # of the target: where less error is left, a filter over the whole image is time without use
 

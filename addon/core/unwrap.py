@@ -27,10 +27,10 @@ def unwrap(scene: Scene, settings: BakeSettings, on_step: Callable[[float], None
 
     ``on_step(done)`` hears after each stage how much (0..1) is done; what it raises ends the work.
     """
-    groups = copies_of(scene)
-    surface = target_surface(scene, groups)
     if settings.keep_uvs:
         return _kept(scene, settings.texels)
+    groups = copies_of(scene)
+    surface = target_surface(scene, groups)
     on_step = on_step or (lambda done: None)
     pieces = cut(surface)
     on_step(0.6)
@@ -42,6 +42,7 @@ def unwrap(scene: Scene, settings: BakeSettings, on_step: Callable[[float], None
 
 
 def _kept(scene, texels):
+    target_surface(scene)  # says where there is nothing to bake
     side = math.isqrt(texels)
     uvs = np.full((len(scene.triangles), 3, 2), np.nan, np.float32)
     charts = np.full(len(scene.triangles), -1, np.int32)

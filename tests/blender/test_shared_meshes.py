@@ -91,7 +91,8 @@ def test_each_duplicate_has_its_own_light(duplicates):
     baked()
     rects = {name: tuple(blender_object["patchlight_rect"]) for name, blender_object in duplicates.items()}
     assert len(set(rects.values())) == 4
-    assert "patchlight_rect" not in bpy.data.objects["Floor"]
+    # a material that all share reads the same of the floor
+    assert tuple(bpy.data.objects["Floor"]["patchlight_rect"]) == (1, 1, 0, 0)
     for blender_object in duplicates.values():
         found = light_on_faces(blender_object)
         top, near, side = towards_the_lamp(blender_object)
@@ -128,6 +129,54 @@ def test_it_can_be_baked_again_in_its_places(duplicates):
         mean = np.mean(list(before[name].values()))
         for normal, value in light_on_faces(blender_object).items():
             assert value == pytest.approx(before[name][normal], abs=three_deviations(value, SETTINGS.error, mean))
+
+
+def test_a_duplicate_of_no_size_takes_nothing_from_the_others(duplicates):
+    for name in ("Cube -x", "Mirrored +y", "Small -y"):
+        duplicates[name].scale = (0, 0, 0)
+    baked()
+    assert max(light_on_faces(duplicates["Cube +x"]).values()) > 0
+    assert "patchlight_rect" not in duplicates["Cube +x"]
+
+
+def test_who_changes_meshes_with_another_since_it_was_read_is_refused(duplicates, add_cube):
+    pair = add_cube("Pair 1"), bpy.data.objects.new("Pair 2", bpy.data.meshes["Pair 1"])
+    bpy.context.scene.collection.objects.link(pair[1])
+    prepared = prepare(bpy.context.scene, SETTINGS)
+    result = bake(prepared.scene, SETTINGS)
+    duplicates["Cube -x"].data = pair[0].data
+    with pytest.raises(SceneError, match="came to share its mesh during the bake: nothing has been written"):
+        write(prepared, result)
+
+
+def test_a_duplicate_that_is_not_baked_now_keeps_its_light(duplicates):
+    baked()
+    other = duplicates["Cube -x"]
+    before, image = light_on_faces(other), other["patchlight_lightmap"]
+    other.modifiers.new("Bevel", "BEVEL")
+    report = prepare(bpy.context.scene, SETTINGS).scene
+    assert [o.name for o in report.objects if o.is_target] == ["Floor"]
+    said = "with 'Cube -x', whose lightmap would no longer fit and which is not baked now: it is not baked; bake both"
+    assert sum(said in warning for warning in report.warnings) == 3
+    other.modifiers.clear()
+    other.hide_render = True
+    assert [o.name for o in prepare(bpy.context.scene, SETTINGS).scene.objects if o.is_target] == ["Floor"]
+    assert (light_on_faces(other), other["patchlight_lightmap"]) == (before, image)
+    # who has no lightmap any more, or is in no scene, has none to lose
+    del other["patchlight_lightmap"]
+    duplicates["Small -y"].users_collection[0].objects.unlink(duplicates["Small -y"])
+    assert sum(o.is_target for o in prepare(bpy.context.scene, SETTINGS).scene.objects) == 3
+
+
+def test_a_copy_that_took_the_rectangle_along_does_not_keep_uvs(duplicates):
+    baked()
+    copy = duplicates["Cube -x"].copy()
+    copy.name = "Copy"
+    copy.location = (5, 5, 1)
+    bpy.context.scene.collection.objects.link(copy)
+    scene = prepare(bpy.context.scene, BakeSettings(keep_uvs=True)).scene
+    assert sum("and so its place in the lightmap (patchlight_rect)" in w for w in scene.warnings) == 2
+    assert {o.name for o in scene.objects if o.is_target} == {"Floor", "Cube +x", "Mirrored +y", "Small -y"}
 
 
 def test_who_shares_a_mesh_since_it_was_read_is_refused(duplicates, add_cube):

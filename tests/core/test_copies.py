@@ -94,6 +94,17 @@ def test_sharing_costs_few_texels():
     assert density(shared) > 0.85 * density(alone)
 
 
+@pytest.mark.parametrize("sides", [(1, 1), (1.57, 0.76, 0.37), (1, 0.5)])
+def test_few_boxes_fill_the_lightmap_as_single_users_do(sides):
+    scene = scene_of(*(moved(box(), side, (3 * k, 0, 0)) for k, side in enumerate(sides)))
+    densities = []
+    for charts in (unwrap(each, BakeSettings(texels=1 << 16)) for each in (scene, sharing(scene, range(len(sides))))):
+        lengths = edge_lengths(charts.uvs) / edge_lengths(scene.corners)
+        densities.append(np.average(lengths.mean(axis=1), weights=areas(scene)))
+    # blocks for rectangles of 2 to 1 and the like, one of which leaves a corner of the atlas free
+    assert densities[1] > 0.85 * densities[0]
+
+
 def test_a_copy_has_texels_by_its_own_size():
     # a large one, one of half its size, and a speck of a hundredth
     scene = sharing(
