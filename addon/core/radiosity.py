@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .choose import choose, mean_reflectance
-from .conjugate_gradient import require_exchange_size, solve_conjugate_gradient
+from .choose import EXCHANGE_TRIANGLES, choose, mean_reflectance
+from .conjugate_gradient import EXCHANGE_LIMIT, require_exchange_size, solve_conjugate_gradient
 from .decomposition import finer
-from .dense import require_direct_size, solve_direct
+from .dense import DIRECT_LIMIT, require_direct_size, solve_direct
 from .emitters import LUMINANCE, Emitters
 from .exchange import exchange_of
 from .joined import joined
@@ -18,7 +18,7 @@ from .laws import Laws, measured_laws
 from .parted import finer_where_parted
 from .patch_light import QUICK_ERROR, PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
-from .patches import Patches, cut, grid_of, patch_size_for, subdivide, triangle_areas
+from .patches import MOST_PATCHES, Grid, Patches, cut, grid_of, patch_size_for, subdivide, triangle_areas
 from .progressive import solve_progressive
 from .scene import Scene
 from .settings import BakeSettings
@@ -30,6 +30,7 @@ from .workers import within
 
 # patches, about, that each solver is given; triangles are never joined, so there may be more
 PATCH_BUDGETS = {"direct": 1200, "conjugate-gradient": 5000, "progressive": 3000, "stochastic": 60000}
+MOST_PATCHES_OF = {"direct": DIRECT_LIMIT // 2, "conjugate-gradient": EXCHANGE_LIMIT // 2}  # by their sides
 DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic, at the least, where errors larger than this are good enough
 COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
 ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
@@ -88,7 +89,8 @@ def _solved(
 ) -> tuple[Solved, Patches]:
     """The same without the laws, and the patches: those that a lightmap's texels mend are rough."""
     error = max(settings.error, LIGHTMAP_ERROR) if is_rough else settings.error
-    solver, method, choice = choose(settings, len(scene.triangles), mean_reflectance(scene), is_rough)
+    reflectance = mean_reflectance(scene)
+    solver, method, choice = choose(settings, len(scene.triangles), _side_count(scene, settings), reflectance, is_rough)
 
     def measure(patches, on_step, known=None):
         return measure_patches(scene, kernel, patches, emitters, sky, error, settings.seed, known, on_step)
@@ -111,7 +113,8 @@ def _solved(
                 patches = joined(scene, kernel, grid, patches)
         lit = measure(patches, within(on_step, 0.0, 0.4))
     else:
-        lit = _decompose(scene, kernel, budget, error, settings.seed, measure, solve, within(on_step, 0.0, 0.4))
+        most = MOST_PATCHES_OF.get(solver, budget + MOST_PATCHES)
+        lit = _decompose(scene, kernel, budget, most, error, settings.seed, measure, solve, within(on_step, 0.0, 0.4))
     solution = solve(lit, error, within(on_step, 0.5, 0.5))
 
     patches = lit.patches
@@ -144,10 +147,25 @@ def _patch_budget(solver: str, settings: BakeSettings, error: float) -> int:
     return int(max(budget * min(1.0, DRAFT_ERROR / error), DRAFT_BUDGET))
 
 
-def _decompose(scene, kernel, budget, error, seed, measure, solve, on_step) -> PatchLight:
-    """Patches that are small where the light changes, and the light on them."""
+def _coarse_grid(scene, budget) -> Grid:
+    """What adaptive decomposition starts with."""
     coarse = int(budget * COARSE_SHARE)
-    grid = grid_of(scene, patch_size_for(scene, coarse), coarse)
+    return grid_of(scene, patch_size_for(scene, coarse), coarse)
+
+
+def _side_count(scene, settings: BakeSettings) -> int:
+    """Of the patches that conjugate gradients would start with; where there are too many triangles these are enough."""
+    if len(scene.triangles) > EXCHANGE_TRIANGLES:
+        return 2 * len(scene.triangles)
+    budget = PATCH_BUDGETS["conjugate-gradient"]
+    if settings.patch_size:
+        return 2 * len(grid_of(scene, settings.patch_size, budget))
+    return 2 * len(_coarse_grid(scene, budget))
+
+
+def _decompose(scene, kernel, budget, most, error, seed, measure, solve, on_step) -> PatchLight:
+    """Patches that are small where the light changes, up to ``most`` of them, and the light on them."""
+    grid = _coarse_grid(scene, budget)
     along = np.ones(len(grid), np.int64)
     rounds = 1 + 2 * len(ROUND_SHARES)  # to measure, and to solve and measure again each time
     lit = measure(cut(scene, kernel, grid, along, seed), within(on_step, 0.0, 1 / rounds))
@@ -157,7 +175,8 @@ def _decompose(scene, kernel, budget, error, seed, measure, solve, on_step) -> P
         first = solve(lit, max(error, QUICK_ERROR), within(on_step, begin / rounds, 1 / rounds))
         reflectance = np.maximum(lit.patches.side_reflectance, LEAST_REFLECTANCE)
         irradiance = (first.radiosity / reflectance) @ LUMINANCE
-        finer_along = finer(grid, along, lit.patches, irradiance, lit.spread, count + int(share * budget))
+        allowed = min(count + int(share * budget), most)
+        finer_along = finer(grid, along, lit.patches, irradiance, lit.spread, allowed)
         lit = replace(lit, rays=lit.rays + first.rays)
         if (finer_along == along).all():
             break
