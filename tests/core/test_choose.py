@@ -44,7 +44,7 @@ def test_the_choice_and_its_reason(settings, triangles, sides, reflectance, solv
 @pytest.mark.parametrize("method", ["auto", "hemicube"])
 @pytest.mark.parametrize(("rings", "segments"), [(4, 40), (3, 70), (2, 140)])
 def test_what_auto_chooses_can_be_solved(method, rings, segments, monkeypatch):
-    """Of the brightness that files begin with, compact and thin triangles; all limits a tenth: it takes their square."""
+    """Of the brightness that files begin with, compact and thin triangles; all limits a tenth: time is their square."""
     most = EXCHANGE_LIMIT // 10
     monkeypatch.setattr(choices, "EXCHANGE_LIMIT", most)
     monkeypatch.setattr(choices, "FEW_SIDES", most)
