@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .charts import FlatCharts
+from .patches import triangle_areas
 from .scene import Scene, SceneError, SceneObject
 
 
@@ -53,8 +54,9 @@ def copies_of(scene: Scene) -> tuple[tuple[SceneObject, ...], ...]:
     for obj in scene.objects:
         if obj.is_target and obj.count and obj.mesh is not None:
             by_mesh.setdefault(obj.mesh, []).append(obj)
-    groups = (group for group in by_mesh.values() if len(group) > 1)
-    return tuple(_model_first(scene, group) for group in groups)
+    groups = [group for group in by_mesh.values() if len(group) > 1]
+    areas = triangle_areas(scene) if groups else None
+    return tuple(_model_first(areas, group) for group in groups)
 
 
 def layouts(scene: Scene, flat: FlatCharts, groups) -> tuple[FlatCharts, tuple[Layout, ...]]:
@@ -70,9 +72,8 @@ def layouts(scene: Scene, flat: FlatCharts, groups) -> tuple[FlatCharts, tuple[L
     )
 
 
-def _model_first(scene, group):
-    areas = [_area(_corners(scene, obj)) for obj in group]
-    model = max(range(len(group)), key=lambda k: (group[k].count, areas[k], -k))
+def _model_first(areas, group):
+    model = max(range(len(group)), key=lambda k: (group[k].count, areas[group[k].span].sum(), -k))
     is_known = np.zeros(max(int(obj.corners.max()) for obj in group) + 1, bool)
     is_known[group[model].corners] = True
     for obj in group:
@@ -105,7 +106,7 @@ def _stretch(scene, layout, obj):
     """How long an object's surface is along u and v of each chart, of the layout's: RMS by area, above 0 (C, 2)."""
     flat = layout.flat
     positions = np.full((int(layout.objects[0].corners.max()) + 1, 3), np.nan)
-    positions[obj.corners] = _corners(scene, obj)
+    positions[obj.corners] = scene.vertices[scene.triangles[obj.span]]
     corners = positions[layout.loops]
     edges, along = corners[:, 1:] - corners[:, :1], flat.uvs[:, 1:] - flat.uvs[:, :1]
     twice_area = along[:, 0, 0] * along[:, 1, 1] - along[:, 0, 1] * along[:, 1, 0]
@@ -119,11 +120,3 @@ def _stretch(scene, layout, obj):
         sums = np.bincount(charts[is_sure], squares, flat.chart_count)
         out[:, axis] = sums / np.maximum(np.bincount(charts, np.abs(twice_area), flat.chart_count), 1e-300)
     return np.maximum(np.sqrt(out), 1e-9)
-
-
-def _corners(scene, obj):
-    return scene.vertices[scene.triangles[obj.span]]
-
-
-def _area(corners):
-    return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
