@@ -27,8 +27,8 @@ def choose(
 
     By time to equal error, measured on closed cubes and the Cornell box of 240 to 12000 sides: rows of form factors and
     conjugate gradients take a third to a tenth of stochastic Jacobi's time at reflectance 0.9, a hundredth at 0.99, up
-    to five times as much at 0.5. They fit up to some 16000 sides, and take long for many: a ball on a floor of 0.8 takes
-    26 s, and 1 s by stochastic Jacobi. Direct takes longer for the same, progressive refinement leaves twice the error,
+    to five times as much at 0.5. They fit up to some 16000 sides, and take long for many: a ball on a floor of 0.8 is
+    26 s, 1 by stochastic Jacobi. Direct takes longer for the same, progressive refinement leaves twice the error,
     as it uses each row for one direction only.
     """
     method = "monte-carlo" if settings.method == "auto" else settings.method
