@@ -55,6 +55,16 @@ class Materials:
         return self._indices[key]
 
 
+ALL = Colour(np.ones(3))
+NOTHING = Surface(transmittance=ALL)  # all light passes
+EVEN = 1e-6  # apart: an image is of one grey
+
+
+def rest_of(share: Colour) -> Colour:
+    """1 less a share of [0, 1]."""
+    return pointwise(lambda c: 1 - c, share)
+
+
 class Notes:
     """What is to be remembered of nodes that were read, each once: images' coordinates, sentences for the report."""
 
@@ -78,14 +88,18 @@ class MaterialReading:
     def material(self) -> Material:
         """The core material; never silently black."""
         surface = self._surface()
-        reflectance, radiance = surface.reflectance.within(1.0), surface.radiance.within(BRIGHTEST)
+        if not surface.transmittance.is_black and surface.reflectance_of_the_rest.largest > 1.01:
+            self.say("it reflects one colour and passes another: some of what it reflects is lost")
+        reflectance, radiance = surface.reflectance_of_the_rest.within(1.0), surface.radiance.within(BRIGHTEST)
+        transmittance = surface.transmittance.within(1.0)
         return Material(
             self._material.name,
             tuple(float(x) for x in reflectance.value),
             reflectance.texture,
             tuple(float(x) for x in radiance.value),
             radiance.texture,
-            tuple(float(x) for x in np.clip(surface.transmittance, 0.0, 1.0)),
+            tuple(float(x) for x in transmittance.value),
+            transmittance.texture,
         )
 
     def coordinates(self) -> Coordinates:
@@ -124,36 +138,36 @@ class MaterialReading:
             self.say(f"its {reached.node.bl_label} is baked as diffuse")
             return Surface(self._colour(reached.feeding(GLOSSY[kind])))
         if kind in PASSING:
-            return Surface(transmittance=self._colour(reached.feeding("Color")).within(1.0).mean)
+            return Surface(transmittance=self._colour(reached.feeding("Color")).within(1.0))
         if kind == "MIX_SHADER":
-            factor = min(max(self._mix_factor(reached.feeding(0)), 0.0), 1.0)
-            return self._sum(((1 - factor, reached.feeding(1)), (factor, reached.feeding(2))))
+            factor = self._mix_factor(reached.feeding(0))
+            return self._sum(((rest_of(factor), reached.feeding(1)), (factor, reached.feeding(2))))
         if kind == "ADD_SHADER":
-            return self._sum(((1.0, reached.feeding(0)), (1.0, reached.feeding(1))))
+            return self._sum(((ALL, reached.feeding(0)), (ALL, reached.feeding(1))))
         if kind == "HOLDOUT":
             return Surface()
         raise Unreadable(f"{reached.node.bl_label} node")
 
     def _sum(self, parts) -> Surface:
-        return weighted_sum([(weight, self._shader(reached)) for weight, reached in parts if weight > 0])
+        return weighted_sum([(weight, self._shader(reached)) for weight, reached in parts if not weight.is_black])
 
     def _principled(self, reached) -> Surface:
         base = self._colour(reached.feeding("Base Color")).within(1.0)
         transmission = self._number(reached, "Transmission Weight")
         radiance = self._emitted(reached, "Emission Color", "Emission Strength")
         if transmission >= 0.5:
-            surface = Surface(radiance=radiance, transmittance=base.mean)
+            surface = Surface(radiance=radiance, transmittance=base)
         else:
             surface = Surface(base.scaled(1 - transmission), radiance)
-        alpha = min(max(self._alpha(reached), 0.0), 1.0)
-        return weighted_sum([(alpha, surface), (1 - alpha, Surface(transmittance=np.ones(3)))])
+        alpha = self._alpha(reached)
+        return surface if alpha.is_white else weighted_sum([(alpha, surface), (rest_of(alpha), NOTHING)])
 
-    def _alpha(self, reached) -> float:
+    def _alpha(self, reached) -> Colour:
         try:
-            return self._mean_of_factor(reached.feeding("Alpha"), "its alpha comes from an image")
+            return self._share(reached.feeding("Alpha"))
         except Unreadable as error:
             self.say(f"its alpha comes from a {error}, which cannot be read: it is baked opaque")
-            return 1.0
+            return ALL
 
     def _emitted(self, reached, colour_name, strength_name) -> Colour:
         strength = self._number(reached, strength_name)
@@ -169,25 +183,24 @@ class MaterialReading:
             self.say(f"its {name} comes from a {error}, which cannot be read: {value:g} is used")
             return value
 
-    def _mix_factor(self, reached) -> float:
+    def _mix_factor(self, reached) -> Colour:
         try:
-            return self._mean_of_factor(reached, "its shaders are mixed by an image")
+            return self._share(reached)
         except Unreadable as error:
             if reached.node.type in BY_VIEW:
                 self.say(f"its shaders are mixed by a {error}: the first one is used")
-                return 0.0
+                return Colour(np.zeros(3))
             self.say(f"its shaders are mixed by a {error}: they are mixed evenly")
-            return 0.5
+            return Colour(np.full(3, 0.5))
 
-    def _mean_of_factor(self, reached, what) -> float:
-        """A number of [0, 1] for the whole material; Unreadable where there is none."""
+    def _share(self, reached) -> Colour:
+        """A grey of [0, 1]; Unreadable where there is none."""
         coordinates = dict(self._notes.coordinates)
         factor = pointwise(lambda c: np.clip(c, 0, 1), grey(self.readable_colour(reached)))
-        self._notes.coordinates = coordinates  # a mean is the same wherever it is looked up
-        value = round(float(factor.mean[0]), 6)  # opaque to the bit, where it is
-        if factor.texture is not None and 0 < value < 1:
-            self.say(f"{what}: by its mean, {value:.2f}, everywhere")
-        return value
+        if factor.texture is not None and np.ptp(factor.texture.pixels) > EVEN:
+            return factor
+        self._notes.coordinates = coordinates  # what is the same all over is so wherever it is looked up
+        return Colour(np.round(factor.mean, 6))  # opaque to the bit, where it is
 
     def factor(self, reached, usual=0.5) -> Colour:
         """A number that a colour hangs on, which may vary over the surface; ``usual`` where it cannot be read."""

@@ -11,6 +11,7 @@ from .read_images import mean_colour, shrunk
 
 BLACK = np.zeros(3)
 FINEST = 512  # texels a side
+LEAST_REST = 1e-3  # of light that does not pass, from which what it is like can be told
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +34,27 @@ class Colour:
         return not np.any(self.value)
 
     @property
+    def is_white(self) -> bool:
+        return self.texture is None and bool(np.all(self.value == 1))
+
+    @property
     def mean(self) -> np.ndarray:
         """One colour for the whole texture."""
         return self.value if self.texture is None else self.value * mean_colour(self.texture.pixels)
 
+    @property
+    def largest(self) -> float:
+        """The largest number of any channel."""
+        return float((self.value if self.texture is None else self.value * self.texture.pixels.max(axis=(0, 1))).max())
+
     def scaled(self, factor) -> Colour:
         return Colour(self.value * factor, self.texture)
+
+    def times(self, other) -> Colour:
+        """The product of two colours."""
+        if self.texture is None or other.texture is None:
+            return Colour(self.value * other.value, self.texture or other.texture)
+        return pointwise(np.multiply, self, other)
 
     def within(self, most) -> Colour:
         """Clipped to [0, most], as a surface can have it; a surface cannot reflect more than 1, all that arrives."""
@@ -54,19 +70,38 @@ class Colour:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """What a shader does with light: reflect it diffusely, emit it, let it pass."""
+    """What a shader does with light, each a share of all of it: reflect it diffusely, emit it, let it pass."""
 
     reflectance: Colour = field(default_factory=lambda: Colour(BLACK))
     radiance: Colour = field(default_factory=lambda: Colour(BLACK))
-    transmittance: np.ndarray = field(default_factory=lambda: BLACK)
+    transmittance: Colour = field(default_factory=lambda: Colour(BLACK))
+
+    @property
+    def reflectance_of_the_rest(self) -> Colour:
+        """What is reflected of the light that does not pass, by its mean share (core.scene.Material).
+
+        Where all passes, none is reflected, and a mean over what an image cuts out must not see that as black.
+        """
+
+        def divided(reflected, passing):
+            rest = 1 - passing.mean(axis=-1, keepdims=True)
+            of_all = np.sum(reflected.reshape(-1, 3), axis=0) / max(np.sum(rest), LEAST_REST)
+            return np.where(rest > LEAST_REST, reflected / np.maximum(rest, LEAST_REST), of_all)
+
+        if self.reflectance.is_black or self.transmittance.is_black:
+            return self.reflectance
+        if self.transmittance.texture is None:
+            return self.reflectance.scaled(divided(np.ones(3), self.transmittance.value))
+        return pointwise(divided, self.reflectance, self.transmittance)
 
 
 def weighted_sum(parts) -> Surface:
-    """The surface that reflects, emits and passes the weighted sum of the parts: (weight, Surface) pairs."""
+    """The surface that reflects, emits and passes the weighted sum of the parts: (weight, Surface) pairs, weights as
+    greys, which may vary over the surface."""
     return Surface(
-        _sum_colours([surface.reflectance.scaled(weight) for weight, surface in parts]),
-        _sum_colours([surface.radiance.scaled(weight) for weight, surface in parts]),
-        sum((weight * surface.transmittance for weight, surface in parts), BLACK),
+        _sum_colours([weight.times(surface.reflectance) for weight, surface in parts]),
+        _sum_colours([weight.times(surface.radiance) for weight, surface in parts]),
+        _sum_colours([weight.times(surface.transmittance) for weight, surface in parts]),
     )
 
 

@@ -104,7 +104,7 @@ def _glowing_triangles(scene):
     corners, triangles = scene.corners[plain], np.repeat(cut, len(weights))
     pieces = np.einsum("pkb,tbc->tpkc", weights, scene.corners[cut]).reshape(-1, 3, 3)
     factors = np.array([m.radiance for m in scene.materials]).reshape(-1, 3)
-    glow = textured_colours(scene, triangles, np.tile(middles, (len(cut), 1)), "radiance", "radiance_texture")
+    glow = textured_colours(scene, triangles, np.tile(middles, (len(cut), 1)), "radiance")
     corners = np.concatenate([corners, pieces])
     radiances = np.concatenate([factors[scene.triangle_materials[plain]], glow])
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

@@ -58,10 +58,8 @@ class KernelScene:
     """
 
     def __init__(self, scene: Scene, workers: Workers):
-        transmittances = np.array([m.transmittance for m in scene.materials], np.float32).reshape(-1, 3)
-        clear = transmittances[scene.triangle_materials] if transmittances.any() else None
         self.workers = workers
-        self._scene = _kernel.create_scene(embree(), scene.vertices, scene.triangles, clear)
+        self._scene = _kernel.create_scene(embree(), scene.vertices, scene.triangles, _clear(scene))
         self._patches = None
         self.centre = np.array(_kernel.scene_centre(self._scene))
         self.side_count = 0
@@ -201,6 +199,26 @@ class KernelScene:
         if not len(emitters):
             return irradiance, variance, 0
         return irradiance, variance, sum(self.workers.each_range(len(receivers), 2048, call, on_step))
+
+
+def _clear(scene: Scene):
+    """What passes straight through the scene's triangles, as the kernel takes it; None where all are opaque."""
+    if not any(material.transmits for material in scene.materials):
+        return None
+    textures = [material.transmittance_texture for material in scene.materials]
+    images = {id(texture): texture.pixels for texture in textures if texture is not None}
+    places = {key: place for place, key in enumerate(images)}
+    maps = np.array([places.get(id(texture), -1) for texture in textures], np.int32)
+    shapes = np.array([pixels.shape[:2] for pixels in images.values()], np.int32).reshape(-1, 2)
+    ends = np.cumsum(shapes.prod(axis=1))
+    return (
+        np.array([m.transmittance for m in scene.materials], np.float32)[scene.triangle_materials],
+        np.array([not m.is_glass for m in scene.materials], np.uint8)[scene.triangle_materials],
+        maps[scene.triangle_materials],
+        scene.uvs.reshape(-1, 6),
+        np.column_stack([ends - shapes.prod(axis=1), shapes]).astype(np.int32),
+        np.concatenate([np.zeros((0, 3), np.float32), *(pixels.reshape(-1, 3) for pixels in images.values())]),
+    )
 
 
 def smooth(workers, grid, receivers, values, variances, step, stops_on_value):

@@ -35,8 +35,8 @@ class Laws:
 
 def measured_laws(scene: Scene, kernel: KernelScene, patches: Patches, seed: int) -> tuple[Laws, int]:
     """The laws by rays that the groups send to each other, and how many."""
-    is_glass = np.array([material.transmits for material in scene.materials], bool)
-    # rays pass glass: it takes none and may send none
+    is_glass = np.array([material.is_glass for material in scene.materials], bool)
+    # all rays pass glass: it takes none and may send none
     areas = np.where(np.repeat(is_glass[scene.triangle_materials[patches.triangles]], 2), 0.0, patches.side_areas)
     groups = _groups(scene, patches)
     present = np.unique(groups[areas > 0])

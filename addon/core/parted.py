@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .kernel import KernelScene
-from .patches import Grid, Patches, laid_out, with_reflectance
+from .patches import Grid, Patches, laid_out, with_materials
 from .scene import Scene
 
 POINTS, LIFT = 8, 0.05  # of a side, so many of its sizes above it: where it is looked for what stands on it,
@@ -52,4 +52,4 @@ def finer_where_parted(scene: Scene, kernel: KernelScene, grid: Grid, most: int,
         if 0 < (along**2 - 1) * parted.sum() <= most:
             patches = laid_out(kernel, grid, np.where(parted, along, whole))
             break
-    return with_reflectance(scene, kernel, patches, seed)
+    return with_materials(scene, kernel, patches, seed)

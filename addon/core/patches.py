@@ -16,7 +16,8 @@ from .scene import Scene
 from .settings import SettingsError
 from .textures import textured_colours
 
-TEXTURE_SAMPLES = 8  # points a patch on which its texture is averaged
+TEXTURE_SAMPLES = 8  # points a patch on which its texture is averaged,
+CUT_OUT_SAMPLES = 32  # and what an image cuts out of it: flux is divided by what is left
 LARGEST_SHARE = 1 / 8  # of all patches that one triangle may take
 MOST_PATCHES = 4_000_000
 
@@ -28,9 +29,9 @@ class Patches:
     Attributes
     ----------
     size : longest edge of a patch, about [m]
-    areas : float64 (P,) [m^2]
+    areas : float64 (P,) of what rays meet: of cloth that half of them pass it is half [m^2]
     triangles : int32 (P,) which triangle each is part of, or the first of its pieces
-    reflectance : float32 (P, 3) rho, the mean over the patch; 0 where the material transmits
+    reflectance : float32 (P, 3) rho, the mean over the patch
     bounds : float32 (P, 4) where each lies on its triangle: distance from the apex at its wide and its narrow end, and
         from the next corner to the one after at its first and its second side, all as shares
     apexes : uint8 (T,)
@@ -121,11 +122,11 @@ def grid_of(scene: Scene, size: float, budget: int) -> Grid:
 
 def cut(scene: Scene, kernel: KernelScene, grid: Grid, along, seed: int) -> Patches:
     """Patches of a grid, ``along`` (C,) of them along each side of every cell; the kernel is told of them."""
-    return with_reflectance(scene, kernel, laid_out(kernel, grid, along), seed)
+    return with_materials(scene, kernel, laid_out(kernel, grid, along), seed)
 
 
 def laid_out(kernel: KernelScene, grid: Grid, along) -> Patches:
-    """Patches of a grid as ``cut`` makes them, without their reflectance, which is 0."""
+    """Patches of a grid as ``cut`` makes them, as if they were opaque and black."""
     first_pieces = _offsets(along**2)
     kernel.set_patches(grid.apexes, grid.first_rows, grid.first_cells, first_pieces.astype(np.int32))
     rows, columns = np.diff(grid.first_rows), np.diff(grid.first_cells)
@@ -208,14 +209,27 @@ def _offsets(counts):
     return np.concatenate([[0], np.cumsum(counts)])
 
 
-def with_reflectance(scene: Scene, kernel: KernelScene, patches: Patches, seed: int) -> Patches:
-    """The patches, as the kernel has them, each with the mean reflectance of its triangle's material over it."""
-    factors = np.array([m.reflectance for m in scene.materials], np.float32).reshape(-1, 3)
+def with_materials(scene: Scene, kernel: KernelScene, patches: Patches, seed: int) -> Patches:
+    """The patches, as the kernel has them, with what their triangles' materials come to over each."""
+    reflectance = _mean_over(scene, kernel, patches, "reflectance", TEXTURE_SAMPLES, seed)
+    areas = patches.areas
+    if any(material.transmits for material in scene.materials):
+        materials = scene.triangle_materials[patches.triangles]
+        passing = _mean_over(scene, kernel, patches, "transmittance", CUT_OUT_SAMPLES, seed)
+        # rays may meet what no sample has: less than a sample's share would make too much of them
+        least = np.array([1 / CUT_OUT_SAMPLES if m.transmittance_texture else 0.0 for m in scene.materials])
+        met = np.maximum(1 - passing.mean(axis=1, dtype=np.float64), least[materials])
+        areas = np.where(np.array([m.is_glass for m in scene.materials])[materials], areas, met * areas)
+    return replace(patches, areas=areas, reflectance=reflectance)
+
+
+def _mean_over(scene, kernel, patches, factor, samples, seed):
+    """The mean over each patch of a material's ``factor``, of [0, 1], times its texture: float32 (P, 3)."""
     materials = scene.triangle_materials[patches.triangles]
-    reflectance = factors[materials]
-    is_textured = np.array([m.reflectance_texture is not None for m in scene.materials], bool)[materials]
+    means = np.array([getattr(m, factor) for m in scene.materials], np.float32).reshape(-1, 3)[materials]
+    is_textured = np.array([getattr(m, f"{factor}_texture") is not None for m in scene.materials], bool)[materials]
     textured = np.flatnonzero(is_textured)
-    points, barycentrics = kernel.patch_points(textured, TEXTURE_SAMPLES, seed)
-    colours = textured_colours(scene, points, barycentrics, "reflectance", "reflectance_texture")
-    reflectance[textured] = colours.reshape(-1, TEXTURE_SAMPLES, 3).mean(axis=1)
-    return replace(patches, reflectance=np.clip(reflectance, 0.0, 1.0))
+    points, barycentrics = kernel.patch_points(textured, samples, seed)
+    colours = textured_colours(scene, points, barycentrics, factor)
+    means[textured] = colours.reshape(-1, samples, 3).mean(axis=1)
+    return np.clip(means, 0.0, 1.0)

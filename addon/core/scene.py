@@ -54,16 +54,21 @@ class Texture:
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """A two-sided Lambertian surface.
+    """A two-sided Lambertian surface, or what of one an image leaves.
+
+    Rays meet it with a chance of 1 less the mean of its transmittance, and pass straight through else.
 
     Attributes
     ----------
     name : str
-    reflectance : (3,) diffuse reflectance rho [0..1]; multiplies the texture where there is one
+    reflectance : (3,) diffuse reflectance rho [0..1] for the light that meets it; multiplies the texture where there
+        is one
     reflectance_texture : Texture or None
     radiance : (3,) self-emitted L_e [W/(m^2 sr)], both sides; multiplies the texture where there is one
     radiance_texture : Texture or None
-    transmittance : (3,) share of the light that passes straight through [0..1]; (0, 0, 0) = opaque
+    transmittance : (3,) share of the light that passes straight through [0..1]; (0, 0, 0) = opaque; multiplies the
+        texture where there is one
+    transmittance_texture : Texture or None
     """
 
     name: str
@@ -72,6 +77,7 @@ class Material:
     radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     radiance_texture: Texture | None = None
     transmittance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    transmittance_texture: Texture | None = None
 
     def __post_init__(self):
         owner = f"material {self.name}"
@@ -81,10 +87,18 @@ class Material:
             brightest = np.array(self.radiance, np.float64) * self.radiance_texture.pixels.max(axis=(0, 1))
             require_colour(owner, "radiance times its texture", brightest, BRIGHTEST)
         require_colour(owner, "transmittance", self.transmittance, 1.0)
+        if self.transmittance_texture is not None:
+            most = np.array(self.transmittance, np.float64) * self.transmittance_texture.pixels.max(axis=(0, 1))
+            require_colour(owner, "transmittance times its texture", most, 1.0)
 
     @property
     def transmits(self) -> bool:
         return max(self.transmittance) > 0
+
+    @property
+    def is_glass(self) -> bool:
+        """Whether what does not pass is lost: all rays pass it, tinted."""
+        return self.transmits and max(self.reflectance) == 0
 
     @property
     def emits(self) -> bool:

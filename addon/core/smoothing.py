@@ -97,7 +97,7 @@ def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Rec
     cells = texel_map.cells
     apart = np.concatenate([_apart(cells[row : row + BAND], receivers.positions) for row in range(0, len(cells), BAND)])
     spacing = float(np.median(apart)) if len(apart) else 1.0
-    colours = textured_colours(scene, texel_map.triangles, texel_map.barycentrics, "reflectance", "reflectance_texture")
+    colours = textured_colours(scene, texel_map.triangles, texel_map.barycentrics, "reflectance")
     return TexelGrid(cells, spacing, charts.uvs, np.clip(colours, 0, 1), texel_map.shown)
 
 

@@ -23,16 +23,13 @@ def lookup(texture: Texture, uvs):
     return (low * (1 - up) + high * up).astype(np.float32)
 
 
-def textured_colours(scene: Scene, triangles, barycentrics, factor: str, texture: str):
-    """A material's ``factor`` times its ``texture``, at points of triangles: float32 (N, 3).
-
-    ``factor`` and ``texture`` name fields of Material: "reflectance" and "reflectance_texture", or the radiance's.
-    """
+def textured_colours(scene: Scene, triangles, barycentrics, factor: str):
+    """A material's ``factor``, as Material names it, times its texture, at points of triangles: float32 (N, 3)."""
     factors = np.array([getattr(m, factor) for m in scene.materials], np.float32).reshape(-1, 3)
     materials = scene.triangle_materials[triangles]
     colours = factors[materials]
     for index, material in enumerate(scene.materials):
-        image = getattr(material, texture)
+        image = getattr(material, f"{factor}_texture")
         if image is None:
             continue
         at = np.flatnonzero(materials == index)

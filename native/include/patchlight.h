@@ -44,22 +44,43 @@ pl_status pl_embree_open(const char *path, pl_embree **out_embree);
 void pl_embree_close(pl_embree *embree);
 
 /*
+ * What passes straight through triangles.
+ *
+ *   transmittance  3 * triangle_count floats, 0 .. 1: the share of light that passes; a triangle with none is opaque
+ *   stops          triangle_count: 1 where rays meet what does not pass, and then see the triangle; 0 where that is
+ *                  lost, as in glass. A ray is stopped by chance, by the mean of the three shares
+ *   maps           triangle_count: which map multiplies the shares, -1 for none
+ *   uvs            6 * triangle_count: where the corners lie in it, from 0 to 1 along a side; it repeats. Not touched,
+ *                  and NULL if you like, where there are no maps
+ *   map_shapes     3 * map_count: first pixel, height, width. A map is looked up bilinearly, its row 0 at v = 0
+ *   pixels         3 * pixel_count floats, 0 .. 1
+ */
+typedef struct pl_clear {
+    const float *transmittance;
+    const uint8_t *stops;
+    const int32_t *maps;
+    const float *uvs;
+    const int32_t *map_shapes;
+    size_t map_count;
+    const float *pixels;
+    size_t pixel_count;
+} pl_clear;
+
+/*
  * A BVH over triangles, both sides visible.
  *
  *   embree         must outlive the scene
  *   vertices       3 * vertex_count doubles; re-centred in double before they become float. PL_ERR_ARGUMENT where one
  *                  is not a number or beyond +-PL_LARGEST_COORDINATE [m]
  *   triangles      3 * triangle_count indices
- *   transmittance  3 * triangle_count floats: the share of light that passes straight through; a
- *                  triangle with any above 0 occludes nothing and tints what passes. NULL = all opaque
+ *   clear          what passes straight through, NULL = all opaque. PL_ERR_ARGUMENT where a map is not there
  *
  * Triangles without an area are kept, so that indices stay, and never hit.
  */
 #define PL_LARGEST_COORDINATE 1e8
 typedef struct pl_scene pl_scene;
 pl_status pl_scene_create(const pl_embree *embree, const double *vertices, size_t vertex_count,
-                          const int32_t *triangles, size_t triangle_count, const float *transmittance,
-                          pl_scene **out_scene);
+                          const int32_t *triangles, size_t triangle_count, const pl_clear *clear, pl_scene **out_scene);
 void pl_scene_destroy(pl_scene *scene);
 
 /*
@@ -129,7 +150,8 @@ pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, si
 
 /*
  * Form factors from some sides to all sides: the share of the power leaving a side that lands on each.
- * A row sums to 1 less what escapes. Visibility is found by rays; transmitting triangles are ignored.
+ * A row sums to 1 less what escapes, and less what glass takes (the mean of its three shares). Visibility is found by
+ * rays.
  *
  * Monte Carlo: cosine rays, stratified in position and direction together by a 4-D Owen-scrambled Sobol
  * sequence (Burley 2020). Hemicube (Cohen & Greenberg 1985): delta form factors of a half cube's pixels,
@@ -165,7 +187,8 @@ void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *
  *   first_rays     side_count + 1: sides[i] owns rays first_rays[i] .. first_rays[i + 1] - 1
  *   first_samples  side_count: how far each side's own sequence has been used before
  *   ray_flux       3 * side_count: what one ray of a side carries, in fixed point: the caller scales so
- *                  that all rays together stay below 2^64 in each channel
+ *                  that all rays together stay below 2^62 in each channel: coloured cloth passes a third of the
+ *                  rays on, with three times what they carry
  *   first, count   the range of rays
  *   io_received    3 * 2 * patch_count: what has landed, added to atomically; integers, so that the sum
  *                  does not depend on the order

@@ -70,6 +70,16 @@ void door_release(door_array *arrays, size_t count) {
         PyBuffer_Release(&arrays[i].view);
 }
 
+bool door_unpack(PyObject *tuple, Py_ssize_t count, PyObject **out_objects) {
+    if (!PyTuple_Check(tuple) || PyTuple_Size(tuple) != count) {
+        PyErr_Format(PyExc_TypeError, "expected a tuple of %zd arrays", count);
+        return false;
+    }
+    for (Py_ssize_t i = 0; i < count; ++i)
+        out_objects[i] = PyTuple_GetItem(tuple, i);
+    return true;
+}
+
 bool door_has_numbers(const door_array *array, size_t count) {
     const size_t found = (size_t)(array->view.len / array->view.itemsize);
     if (found != count)

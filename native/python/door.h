@@ -36,6 +36,9 @@ static inline size_t door_rows(const door_array *array) {
     return (size_t)(array->view.len / array->view.itemsize / array->columns);
 }
 
+/* Items of a tuple argument into out_objects[0 .. count); false with an exception if it is no tuple of that many. */
+bool door_unpack(PyObject *tuple, Py_ssize_t count, PyObject **out_objects);
+
 /* Whether an array holds so many numbers; an exception names it where not. */
 bool door_has_numbers(const door_array *array, size_t count);
 

@@ -29,17 +29,6 @@ static pl_receivers receivers_of(const door_array *arrays) {
     return (pl_receivers){arrays[0].view.buf, arrays[1].view.buf, arrays[2].view.buf, door_rows(&arrays[0])};
 }
 
-/* Items of a tuple argument into objects[0..count); false with an exception if it is no tuple of that many. */
-static bool unpack(PyObject *tuple, Py_ssize_t count, PyObject **out_objects) {
-    if (!PyTuple_Check(tuple) || PyTuple_Size(tuple) != count) {
-        PyErr_Format(PyExc_TypeError, "expected a tuple of %zd arrays", count);
-        return false;
-    }
-    for (Py_ssize_t i = 0; i < count; ++i)
-        out_objects[i] = PyTuple_GetItem(tuple, i);
-    return true;
-}
-
 /* What gathering needs of the scene: 2 capsules, then the arrays of the solution, the texels, the lights, the
  * receivers. */
 enum {
@@ -76,9 +65,9 @@ static pl_texel_light texels_of(const door_array *arrays, int32_t width, float r
 
 /* The tuples (solution, lights, receivers) into objects[0 .. GATHER_ARRAY_COUNT); false with an exception. */
 static bool unpack_gather(PyObject *const *tuples, PyObject **out_objects) {
-    return unpack(tuples[0], SOLUTION_ARRAY_COUNT, out_objects) &&
-           unpack(tuples[1], LIGHT_ARRAY_COUNT, out_objects + LIGHTS_AT) &&
-           unpack(tuples[2], RECEIVER_ARRAY_COUNT, out_objects + RECEIVERS_AT);
+    return door_unpack(tuples[0], SOLUTION_ARRAY_COUNT, out_objects) &&
+           door_unpack(tuples[1], LIGHT_ARRAY_COUNT, out_objects + LIGHTS_AT) &&
+           door_unpack(tuples[2], RECEIVER_ARRAY_COUNT, out_objects + RECEIVERS_AT);
 }
 
 /* The arrays as the kernel takes them; `scene` points into the rest. */
@@ -121,8 +110,8 @@ PyObject *door_gather(PyObject *self, PyObject *args) {
                            {"selected", 'I', 1, -1, false, {0}},
                            {"io_light", 'f', 3, AS_MANY_ROWS_AS(RECEIVERS_AT), true, {0}},
                            {"io_luminances", 'f', 1, -1, true, {0}}};
-    if (!patches || !unpack_gather(tuples, objects) || !unpack(guide_arrays, 2, objects + GROUPS) ||
-        !unpack(sums, 2, objects + LIGHT) || !door_arrays(objects, arrays, ARRAYS))
+    if (!patches || !unpack_gather(tuples, objects) || !door_unpack(guide_arrays, 2, objects + GROUPS) ||
+        !door_unpack(sums, 2, objects + LIGHT) || !door_arrays(objects, arrays, ARRAYS))
         return NULL;
     if (!door_has_numbers(&arrays[LUMINANCES], (size_t)rays.replicates * door_rows(&arrays[RECEIVERS_AT]))) {
         door_release(arrays, ARRAYS);
@@ -199,8 +188,9 @@ PyObject *door_direct(PyObject *self, PyObject *args) {
                            RECEIVER_ARRAYS(RECEIVERS),
                            {"out_irradiance", 'f', 3, AS_MANY_ROWS_AS(RECEIVERS), true, {0}},
                            {"out_variance", 'f', 1, AS_MANY_ROWS_AS(RECEIVERS), true, {0}}};
-    if (!scene || !unpack(light_arrays, LIGHT_ARRAY_COUNT, objects) ||
-        !unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) || !door_arrays(objects, arrays, ARRAYS))
+    if (!scene || !door_unpack(light_arrays, LIGHT_ARRAY_COUNT, objects) ||
+        !door_unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects + RECEIVERS) ||
+        !door_arrays(objects, arrays, ARRAYS))
         return NULL;
     const pl_lights lights = lights_of(arrays);
     const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
@@ -264,7 +254,7 @@ PyObject *door_smooth(PyObject *self, PyObject *args) {
                            {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
                            {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}},
                            {"out_variances", 'f', 1, AS_MANY_ROWS_AS(0), true, {0}}};
-    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS) ||
+    if (!door_unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS) ||
         !grid_fits(arrays, ARRAYS, &grid, first_row, row_count))
         return NULL;
     const pl_receivers receivers = receivers_of(arrays);
@@ -294,7 +284,7 @@ PyObject *door_clamp_outliers(PyObject *self, PyObject *args) {
                            {"values", 'f', 3, AS_MANY_ROWS_AS(0), false, {0}},
                            {"variances", 'f', 1, AS_MANY_ROWS_AS(0), false, {0}},
                            {"out_values", 'f', 3, AS_MANY_ROWS_AS(0), true, {0}}};
-    if (!unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS) ||
+    if (!door_unpack(receiver_arrays, RECEIVER_ARRAY_COUNT, objects) || !door_arrays(objects, arrays, ARRAYS) ||
         !grid_fits(arrays, ARRAYS, &grid, first_row, row_count))
         return NULL;
     const pl_receivers receivers = receivers_of(arrays);

@@ -25,23 +25,36 @@ static PyObject *open_embree(PyObject *self, PyObject *args) {
 }
 
 static PyObject *create_scene(PyObject *self, PyObject *args) {
-    PyObject *parent, *objects[3];
+    enum { CLEAR_AT = 2, CLEAR_ARRAYS = 6, ARRAYS = CLEAR_AT + CLEAR_ARRAYS };
+    PyObject *parent, *clear, *objects[ARRAYS];
     pl_scene *scene = NULL;
     pl_status status;
     (void)self;
-    if (!PyArg_ParseTuple(args, "OOOO", &parent, &objects[0], &objects[1], &objects[2]))
+    if (!PyArg_ParseTuple(args, "OOOO", &parent, &objects[0], &objects[1], &clear))
+        return NULL;
+    const bool is_clear = clear != Py_None;
+    if (is_clear && !door_unpack(clear, CLEAR_ARRAYS, objects + CLEAR_AT))
         return NULL;
     const pl_embree *embree = PyCapsule_GetPointer(parent, EMBREE);
     door_array arrays[] = {{"vertices", 'd', 3, -1, false, {0}},
                            {"triangles", 'i', 3, -1, false, {0}},
-                           {"transmittance", 'f', 3, AS_MANY_ROWS_AS(1), false, {0}}};
-    const size_t count = objects[2] == Py_None ? 2 : 3;
+                           {"transmittance", 'f', 3, AS_MANY_ROWS_AS(1), false, {0}},
+                           {"stops", 'B', 1, AS_MANY_ROWS_AS(1), false, {0}},
+                           {"maps", 'i', 1, AS_MANY_ROWS_AS(1), false, {0}},
+                           {"uvs", 'f', 6, AS_MANY_ROWS_AS(1), false, {0}},
+                           {"map_shapes", 'i', 3, -1, false, {0}},
+                           {"pixels", 'f', 3, -1, false, {0}}};
+    const size_t count = is_clear ? ARRAYS : CLEAR_AT;
     if (!embree || !door_arrays(objects, arrays, count))
         return NULL;
+    pl_clear passing = {0};
+    if (is_clear)
+        passing = (pl_clear){arrays[2].view.buf, arrays[3].view.buf,    arrays[4].view.buf, arrays[5].view.buf,
+                             arrays[6].view.buf, door_rows(&arrays[6]), arrays[7].view.buf, door_rows(&arrays[7])};
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_scene_create(embree, arrays[0].view.buf, door_rows(&arrays[0]), arrays[1].view.buf,
-                             door_rows(&arrays[1]), count == 3 ? arrays[2].view.buf : NULL, &scene);
+                             door_rows(&arrays[1]), is_clear ? &passing : NULL, &scene);
     Py_END_ALLOW_THREADS
 
     door_release(arrays, count);
@@ -158,7 +171,8 @@ static PyObject *pack_charts(PyObject *self, PyObject *args) {
 static PyMethodDef methods[] = {
     {"open_embree", open_embree, METH_VARARGS, "open_embree(path) -> embree"},
     {"create_scene", create_scene, METH_VARARGS,
-     "create_scene(embree, vertices, triangles, transmittance or None) -> scene"},
+     "create_scene(embree, vertices, triangles, (transmittance, stops, maps, uvs, map_shapes, pixels) or None) -> "
+     "scene"},
     {"scene_centre", scene_centre, METH_O, "scene_centre(scene) -> (x, y, z)"},
     {"closest_hits", closest_hits, METH_VARARGS, "closest_hits(scene, origins, directions, out_triangles, out_hits)"},
     {"occluded", occluded, METH_VARARGS, "occluded(scene, points_from, points_to, out_occluded)"},

@@ -9,6 +9,7 @@
 #include "direct.h"
 
 #include "aimed_light.h"
+#include "clear.h"
 #include "sampling.h"
 
 #include <stdlib.h>
@@ -77,11 +78,10 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
     if (!aim(lights, chosen, origin, normal, true, &aimed) ||
         !sample_aimed(&aimed, sobol(0, 0, seed), sobol(0, 1, seed), &sample))
         return false;
-    if (!is_occluded(scene, origin, sample.direction, sample.far)) {
-        transmit(scene, origin, sample.direction, sample.far, sample.irradiance);
+    if (!is_occluded(scene, origin, sample.direction, sample.far) &&
+        transmit(scene, origin, sample.direction, sample.far, sample.irradiance))
         for (int c = 0; c < 3; ++c)
             out_rgb[c] = bounded(sample.irradiance[c] * (total / importances[chosen]));
-    }
     return true;
 }
 
@@ -104,8 +104,7 @@ static bool shine(direct_job *job, const pl_receiver_frame *frame, pl_light_samp
     if (below ? !frame->is_smooth || is_hidden_from_smooth(job->scene, frame, io_sample->direction, io_sample->far)
               : is_occluded(job->scene, frame->origin, io_sample->direction, io_sample->far))
         return false;
-    transmit(job->scene, frame->origin, io_sample->direction, io_sample->far, io_sample->irradiance);
-    return true;
+    return transmit(job->scene, frame->origin, io_sample->direction, io_sample->far, io_sample->irradiance);
 }
 
 typedef struct light_sums {

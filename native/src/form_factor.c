@@ -4,16 +4,18 @@
  * Cohen & Greenberg 1985, "The Hemi-Cube"; Burley 2020, "Practical Hash-based Owen Scrambling".
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
+#include "clear.h"
 #include "patches.h"
 
 #include <string.h>
 
-/* Add a ray's share to the entry of what it hits. */
+/* Add a ray's share to the entry of what it hits, less what clear triangles take of it: in grey, as a row is one. */
 static void deposit(const pl_scene *scene, const pl_patches *patches, vec3 origin, vec3 direction, double share,
                     double *row) {
-    const pl_hit hit = closest_hit(scene, origin, direction, 0);
+    float through[3] = {1, 1, 1};
+    const pl_hit hit = first_stop(scene, origin, direction, through);
     if (hit.triangle >= 0)
-        row[hit_side(patches, &hit)] += share;
+        row[hit_side(patches, &hit)] += share * (double)(through[0] + through[1] + through[2]) / 3;
 }
 
 static bool sides_are_in_range(const pl_patches *patches, const int32_t *sides, size_t count) {

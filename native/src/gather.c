@@ -6,6 +6,7 @@
  * something, and contact stays dark, at any patch size.
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
+#include "clear.h"
 #include "direct.h"
 #include "guide.h"
 #include "patches.h"
@@ -106,10 +107,8 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
     bool skips_lights = true; /* what was sampled as a light must not be seen once more */
 
     for (int step = 0; step < MOST_STEPS; ++step) {
-        const pl_hit hit = closest_hit(job->scene, origin, direction, 0);
+        const pl_hit hit = first_stop(job->scene, origin, direction, weight);
         ++job->rays;
-        if (job->scene->clear.bvh)
-            transmit(job->scene, origin, direction, hit.distance, weight);
         if (hit.triangle < 0) {
             add(io_sum, sky_seen(solution->sky, solution->sky_side, direction), weight);
             return;

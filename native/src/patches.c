@@ -40,13 +40,6 @@ static bool owners_are_valid(const int32_t *owners, size_t piece_count, const in
     return is_rising(first_members, patch_count);
 }
 
-static int32_t *copy_of(const int32_t *numbers, size_t count) {
-    int32_t *copy = malloc(sizeof *copy * count);
-    if (copy)
-        memcpy(copy, numbers, sizeof *copy * count);
-    return copy;
-}
-
 /* Which run each number belongs to: the inverse of offsets. */
 static int32_t *run_of_each(const int32_t *offsets, size_t count) {
     int32_t *owner = malloc(sizeof *owner * ((size_t)offsets[count] + 1));
@@ -116,9 +109,9 @@ pl_status pl_patches_create(const pl_patch_layout *layout, pl_patches **out_patc
     patches->cell_count = layout->cell_count;
     patches->piece_count = patches->patch_count = (size_t)layout->first_pieces[layout->cell_count];
     patches->apexes = malloc(layout->triangle_count + 1);
-    patches->first_rows = copy_of(layout->first_rows, layout->triangle_count + 1);
-    patches->first_cells = copy_of(layout->first_cells, layout->row_count + 1);
-    patches->first_pieces = copy_of(layout->first_pieces, layout->cell_count + 1);
+    patches->first_rows = copy_of(layout->first_rows, sizeof(int32_t) * (layout->triangle_count + 1));
+    patches->first_cells = copy_of(layout->first_cells, sizeof(int32_t) * (layout->row_count + 1));
+    patches->first_pieces = copy_of(layout->first_pieces, sizeof(int32_t) * (layout->cell_count + 1));
     patches->piece_cells = run_of_each(layout->first_pieces, layout->cell_count);
     patches->cell_rows = run_of_each(layout->first_cells, layout->row_count);
     patches->row_triangles = run_of_each(layout->first_rows, layout->triangle_count);

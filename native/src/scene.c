@@ -1,13 +1,13 @@
 /* The scene's BVHs, and the rays through them. SPDX-License-Identifier: GPL-3.0-or-later */
-#include "scene.h"
+#include "clear.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-static bool transmits(const pl_scene *scene, size_t triangle) {
-    if (!scene->transmittance)
+static bool is_clear(const pl_scene *scene, size_t triangle) {
+    if (!scene->clear.transmittance)
         return false;
-    const float *t = scene->transmittance + 3 * triangle;
+    const float *t = scene->clear.transmittance + 3 * triangle;
     return t[0] > 0 || t[1] > 0 || t[2] > 0;
 }
 
@@ -42,7 +42,7 @@ static pl_status build_layer(pl_scene *scene, bool clear, pl_layer *out_layer) {
     RTCGeometry geometry = NULL;
 
     for (size_t t = 0; t < scene->triangle_count; ++t)
-        count += transmits(scene, t) == clear;
+        count += is_clear(scene, t) == clear;
     out_layer->bvh = embree->new_scene(embree->device);
     out_layer->triangles = malloc(sizeof(int32_t) * (count + 1));
     if (!out_layer->bvh || !out_layer->triangles)
@@ -62,7 +62,7 @@ static pl_status build_layer(pl_scene *scene, bool clear, pl_layer *out_layer) {
         memcpy(vertex_buffer, scene->vertices, 3 * sizeof(float) * scene->vertex_count);
         size_t k = 0;
         for (size_t t = 0; t < scene->triangle_count; ++t) {
-            if (transmits(scene, t) != clear)
+            if (is_clear(scene, t) != clear)
                 continue;
             memcpy(index_buffer + 3 * k, scene->indices + 3 * t, 3 * sizeof(uint32_t));
             if (is_degenerate(scene, (int32_t)t))
@@ -95,7 +95,7 @@ static bool coordinates_are_in_range(const double *vertices, size_t vertex_count
     return true;
 }
 
-static void *copy_of(const void *bytes, size_t size) {
+void *copy_of(const void *bytes, size_t size) {
     void *copy = malloc(size ? size : 1);
     if (copy && size)
         memcpy(copy, bytes, size);
@@ -103,7 +103,7 @@ static void *copy_of(const void *bytes, size_t size) {
 }
 
 pl_status pl_scene_create(const pl_embree *embree, const double *vertices, size_t vertex_count,
-                          const int32_t *triangles, size_t triangle_count, const float *transmittance,
+                          const int32_t *triangles, size_t triangle_count, const pl_clear *clear,
                           pl_scene **out_scene) {
     if (!indices_are_in_range(triangles, triangle_count, vertex_count) ||
         !coordinates_are_in_range(vertices, vertex_count))
@@ -117,14 +117,14 @@ pl_status pl_scene_create(const pl_embree *embree, const double *vertices, size_
     scene->triangle_count = triangle_count;
     scene->vertices = malloc(3 * sizeof(float) * (vertex_count + 1));
     scene->indices = copy_of(triangles, 3 * sizeof(int32_t) * triangle_count);
-    if (transmittance)
-        scene->transmittance = copy_of(transmittance, 3 * sizeof(float) * triangle_count);
-    if (!scene->vertices || !scene->indices || (transmittance && !scene->transmittance))
+    if (!scene->vertices || !scene->indices)
         goto done;
     recentre(scene, vertices);
-    status = build_layer(scene, false, &scene->opaque);
-    if (status == PL_OK && transmittance)
-        status = build_layer(scene, true, &scene->clear);
+    status = clear ? clear_copy(clear, triangle_count, &scene->clear) : PL_OK;
+    if (status == PL_OK)
+        status = build_layer(scene, false, &scene->opaque);
+    if (status == PL_OK && clear)
+        status = build_layer(scene, true, &scene->clear_layer);
 done:
     if (status == PL_OK)
         *out_scene = scene;
@@ -143,10 +143,10 @@ void pl_scene_destroy(pl_scene *scene) {
     if (!scene)
         return;
     destroy_layer(scene, &scene->opaque);
-    destroy_layer(scene, &scene->clear);
+    destroy_layer(scene, &scene->clear_layer);
+    clear_destroy(&scene->clear);
     free(scene->vertices);
     free(scene->indices);
-    free(scene->transmittance);
     free(scene);
 }
 
@@ -202,19 +202,8 @@ bool is_occluded(const pl_scene *scene, vec3 origin, vec3 direction, float far) 
     return ray.tfar < 0;
 }
 
-void transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, float io_rgb[3]) {
-    float near = 0;
-    if (!scene->clear.bvh)
-        return;
-    /* a guard against a stack of faces so close that the distance no longer grows */
-    for (int faces = 0; faces < 256; ++faces) {
-        const pl_hit hit = layer_hit(scene, &scene->clear, origin, direction, near, far);
-        if (hit.triangle < 0)
-            return;
-        for (int k = 0; k < 3; ++k)
-            io_rgb[k] *= scene->transmittance[3 * (size_t)hit.triangle + (size_t)k];
-        near = nextafterf(hit.distance, INFINITY);
-    }
+pl_hit clear_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near, float far) {
+    return layer_hit(scene, &scene->clear_layer, origin, direction, near, far);
 }
 
 static vec3 recentred(const pl_scene *scene, const double *p) {

@@ -19,10 +19,10 @@ struct pl_scene {
     float reach;     /* largest coordinate of a vertex */
     float *vertices; /* re-centred */
     int32_t *indices;
-    float *transmittance; /* NULL where all is opaque */
     size_t vertex_count, triangle_count;
+    pl_clear clear; /* copies; all NULL where all is opaque */
     pl_layer opaque;
-    pl_layer clear; /* bvh NULL where all is opaque */
+    pl_layer clear_layer; /* bvh NULL where all is opaque */
 };
 
 typedef struct pl_hit {
@@ -74,7 +74,11 @@ pl_hit hit_at_edge(const pl_scene *scene, vec3 origin, vec3 direction, float nea
 
 /* Opaque triangles strictly between origin and origin + direction. */
 bool is_occluded(const pl_scene *scene, vec3 origin, vec3 direction, float far);
-/* Multiply io_rgb by what the transmitting triangles up to `far` let through. */
-void transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, float io_rgb[3]);
+
+/* The first clear triangle between `near` and `far`; clear.h has what it does to light. */
+pl_hit clear_hit(const pl_scene *scene, vec3 origin, vec3 direction, float near, float far);
+
+/* `size` bytes that free() takes back, NULL where there is no memory. */
+void *copy_of(const void *bytes, size_t size);
 
 #endif

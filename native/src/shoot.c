@@ -2,6 +2,7 @@
  * Stochastic Jacobi's step: local lines that carry flux (Bekaert 1999, ch. 6).
  * SPDX-License-Identifier: GPL-3.0-or-later
  */
+#include "clear.h"
 #include "patches.h"
 
 #include <string.h>
@@ -11,14 +12,6 @@ static void add_flux(uint64_t *io_rgb, const uint64_t *rgb) {
     for (int k = 0; k < 3; ++k)
         if (rgb[k])
             __atomic_fetch_add(io_rgb + k, rgb[k], __ATOMIC_RELAXED);
-}
-
-/* What transmitting triangles let through of a ray's flux. */
-static void tint_flux(const pl_scene *scene, vec3 origin, vec3 direction, float far, uint64_t io_rgb[3]) {
-    float through[3] = {1, 1, 1};
-    transmit(scene, origin, direction, far, through);
-    for (int k = 0; k < 3; ++k)
-        io_rgb[k] = (uint64_t)((double)io_rgb[k] * (double)lesser(through[k], 1));
 }
 
 /* The index of the side that owns ray `ray`: of the last whose first ray is not after it. */
@@ -52,11 +45,11 @@ void pl_shoot(const pl_scene *scene, const pl_patches *patches, const int32_t *s
         const vec3 direction =
             cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), from.u, from.v, from.normal);
 
-        const pl_hit hit = closest_hit(scene, from.origin, direction, 0);
+        float through[3] = {1, 1, 1};
+        const pl_hit hit = first_stop(scene, from.origin, direction, through);
         uint64_t flux[3];
-        memcpy(flux, ray_flux + 3 * i, sizeof flux);
-        if (scene->clear.bvh)
-            tint_flux(scene, from.origin, direction, hit.distance, flux);
+        for (size_t c = 0; c < 3; ++c)
+            flux[c] = through[c] == 1 ? ray_flux[3 * i + c] : (uint64_t)((double)ray_flux[3 * i + c] * through[c]);
         add_flux(hit.triangle < 0 ? io_escaped : io_received + 3 * hit_side(patches, &hit), flux);
     }
 }

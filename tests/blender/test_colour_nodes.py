@@ -294,7 +294,8 @@ def test_a_ramp_of_noise_is_its_mean_and_it_is_said(nodes, plane):
     assert "'Wood'" in warnings[0]
 
 
-def test_an_alpha_image_lets_its_share_through_and_it_is_said(nodes, plane):
+def test_an_alpha_image_cuts_out_what_it_says(nodes, plane):
+    """Where nothing is left, the colour is that of what is: a mean over both must not see the holes as black."""
     image = bpy.data.images.new("Leaf", 2, 2, alpha=True, float_buffer=True)
     image.colorspace_settings.name = "Non-Color"
     image.pixels.foreach_set(np.array([0.5, 0.5, 0.5, 1.0] + 3 * [0.5, 0.5, 0.5, 0.0], np.float32))
@@ -303,11 +304,49 @@ def test_an_alpha_image_lets_its_share_through_and_it_is_said(nodes, plane):
     tree.link(node, principled, "Color", "Base Color")
     tree.show(tree.link(node, principled, "Alpha", "Alpha"))
     found, warnings = read_with_warnings(plane, material)
-    assert found.transmittance == (0.75, 0.75, 0.75)
-    np.testing.assert_allclose(found.reflectance_texture.pixels * found.reflectance, 0.125)
+    passing = found.transmittance_texture.pixels * found.transmittance
+    np.testing.assert_array_equal(passing[..., 0], [[0, 1], [1, 1]])
+    np.testing.assert_allclose(found.reflectance_texture.pixels * found.reflectance, 0.5)
+    assert warnings == ()
+
+
+def test_what_passes_in_part_reflects_the_rest(nodes, plane):
+    """A quarter passes, three quarters meet a surface of the colour that it has."""
+    material, tree = nodes("Curtain")
+    tree.show(tree.new("BsdfPrincipled", **{"Base Color": (0.8, 0.6, 0.4, 1.0), "Alpha": 0.75}))
+    found, warnings = read_with_warnings(plane, material)
+    np.testing.assert_allclose(found.transmittance, 0.25, atol=1e-6)
+    np.testing.assert_allclose(found.reflectance, (0.8, 0.6, 0.4), atol=1e-6)
+    assert warnings == ()
+
+
+def test_shaders_are_mixed_by_an_image_texel_by_texel(nodes, add_image, plane):
+    pixels = np.repeat(np.float32([[[0.0], [0.25]], [[0.75], [1.0]]]), 3, axis=2)
+    material, tree = nodes("Inlay")
+    mix = tree.new("MixShader")
+    tree.link(image_node(tree, add_image(pixels, is_float=True, space="Non-Color")), mix, 0, 0)
+    tree.link(tree.new("BsdfDiffuse", Color=(0.2, 0.4, 0.6, 1.0)), mix, 0, 1)
+    tree.link(tree.new("BsdfDiffuse", Color=(0.6, 0.4, 0.2, 1.0)), mix, 0, 2)
+    tree.show(mix)
+    found, warnings = read_with_warnings(plane, material)
+    colours = found.reflectance_texture.pixels * found.reflectance
+    np.testing.assert_allclose(colours, pixels * [0.6, 0.4, 0.2] + (1 - pixels) * [0.2, 0.4, 0.6], atol=1e-6)
+    assert not found.transmits
+    assert warnings == ()
+
+
+def test_what_passes_in_another_colour_than_it_reflects_is_said_to_lose_some(nodes, plane):
+    """All yellow passes and all blue is reflected: a third of all rays meet it, which is not enough for blue."""
+    material, tree = nodes("Film")
+    add = tree.new("AddShader")
+    tree.link(tree.new("BsdfTransparent", Color=(1.0, 1.0, 0.0, 1.0)), add, 0, 0)
+    tree.link(tree.new("BsdfDiffuse", Color=(0.0, 0.0, 1.0, 1.0)), add, 0, 1)
+    tree.show(add)
+    found, warnings = read_with_warnings(plane, material)
+    assert found.transmittance == (1, 1, 0)
+    assert found.reflectance == (0, 0, 1)
     assert len(warnings) == 1
-    assert "'Leaf'" in warnings[0]
-    assert "0.25" in warnings[0]
+    assert "'Film'" in warnings[0]
 
 
 def test_an_image_whose_alpha_is_one_is_opaque_without_a_word(nodes, add_image, plane):
@@ -319,14 +358,15 @@ def test_an_image_whose_alpha_is_one_is_opaque_without_a_word(nodes, add_image, 
     assert warnings == ()
 
 
-def test_what_alpha_an_image_has_is_clamped_before_its_mean(nodes, add_image, plane):
-    """Texels of .5 and 0, times 4, let through none and all: half."""
+def test_what_alpha_an_image_has_is_clamped(nodes, add_image, plane):
+    """Texels of .5 and 0, times 4, let through none and all."""
     pixels = np.array([[[0.5] * 3, [0.0] * 3]], np.float32)
     material, tree = nodes()
     alpha = arithmetic(tree, "MULTIPLY", 4.0, image_node(tree, add_image(pixels, is_float=True, space="Non-Color")))
     tree.show(tree.link(alpha, tree.new("BsdfPrincipled"), 0, "Alpha"))
     found, _ = read_with_warnings(plane, material)
-    assert found.transmittance == (0.5, 0.5, 0.5)
+    passing = found.transmittance_texture.pixels * found.transmittance
+    np.testing.assert_array_equal(passing[0, :, 0], [0, 1])
 
 
 def test_a_number_that_no_image_has_a_part_in_is_read_without_a_word(nodes, plane):

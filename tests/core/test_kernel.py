@@ -102,7 +102,9 @@ def test_kernel_and_twin_agree_on_occlusion():
 
 
 def test_what_transmits_hides_nothing():
-    pane = rectangle((0, 0, 1), (1, 0, 0), (0, 1, 0), material=Material("glass", transmittance=(0.9, 0.9, 0.9)))
+    pane = rectangle(
+        (0, 0, 1), (1, 0, 0), (0, 1, 0), material=Material("glass", (0, 0, 0), transmittance=(0.9, 0.9, 0.9))
+    )
     floor = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
     with kernel_of(scene_of([floor, pane])) as kernel:
         point, above = np.array([[0.3, 0.4, 0.5]]), np.array([[0.3, 0.4, 2.0]])

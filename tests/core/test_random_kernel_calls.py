@@ -39,16 +39,36 @@ def sound_meshes(draw):
 
 
 @st.composite
+def clear_triangles(draw, count):
+    """Glass and cloth, grey, and images on them, now and then ones that are not there."""
+    shares = np.repeat(arrays(draw, (count, 1), np.float32, st.sampled_from((0, 0.5, 0.3, 1))), 3, axis=1)
+    stops = arrays(draw, count, np.uint8, st.sampled_from((0, 1)))
+    maps = arrays(draw, count, np.int32, st.sampled_from((-1, -1, 0, 1, 1, 5, -7)))
+    shapes = np.int32([[0, 2, 3], [6, 1, 1]])[: draw(st.integers(0, 2))]
+    shapes += arrays(draw, shapes.shape, np.int32, st.sampled_from((0, 0, 0, 0, 0, 0, -3, 1 << 30)))
+    pixels = np.repeat(arrays(draw, (7, 1), np.float32, st.sampled_from((0, 0.5, 1))), 3, axis=1)
+    return shares, stops, maps, arrays(draw, (count, 6), np.float32, lengths), shapes, pixels
+
+
+def maps_are_there(clear):
+    if clear is None:
+        return True
+    _, _, maps, _, shapes, pixels = clear
+    first, height, width = shapes.astype(np.int64).T
+    are_shapes = (first >= 0) & (height > 0) & (width > 0) & (first + height * width <= len(pixels))
+    return are_shapes.all() and ((maps >= -1) & (maps < len(shapes))).all()
+
+
+@st.composite
 def kernels(draw):
     """(scene, patches, number of patches, of triangles), or None where the scene was refused."""
     points, triangles = draw(sound_meshes())
-    clear = draw(st.sampled_from((None, None, 0.5)))
-    clear = None if clear is None else np.full((len(triangles), 3), clear, np.float32)
+    clear = draw(clear_triangles(len(triangles))) if draw(st.integers(0, 2)) == 0 else None
     try:
         scene = _kernel.create_scene(embree(), points, triangles, clear)
     except ValueError:
         usable = np.abs(points) <= 1e8
-        assert not usable.all()
+        assert not usable.all() or not maps_are_there(clear)
         return None
     rows = np.resize([1, 2], len(triangles))
     first_rows = np.concatenate([[0], np.cumsum(rows)]).astype(np.int32)

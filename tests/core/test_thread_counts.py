@@ -24,14 +24,16 @@ ROUTES = [
 
 
 def furnished():
-    """What takes every path of the kernel: smooth and flat, glass, a glowing mesh, a lamp, and sky through a door."""
-    glass = Material("glass", transmittance=(0.9, 0.7, 0.5))
+    """What takes every path of the kernel: smooth, flat, glass, cloth, a glowing mesh, a lamp, sky through a door."""
+    glass = Material("glass", (0, 0, 0), transmittance=(0.9, 0.7, 0.5))
+    cloth = Material("cloth", transmittance=(0.3, 0.5, 0.1))
     glow = Material("glow", radiance=(5.0, 4.0, 3.0))
     panel = AreaLight("panel", (0.5, 0.5, 0.95), (0, 0.2, 0), (0.2, 0, 0), (3.0, 3.0, 4.0))
     parts = [
         box((0, 0, 0), (1, 1, 1), inwards=True, without=("-y",), name="room"),
         sphere((0.3, 0.5, 0.3), 0.2, rings=5, segments=8, name="ball"),
         rectangle((0.6, 0.3, 0.0), (0.0, 0.4, 0.0), (0.0, 0.0, 0.6), material=glass, name="pane"),
+        rectangle((0.1, 0.1, 0.5), (0.3, 0.0, 0.0), (0.0, 0.0, 0.4), material=cloth, name="curtain"),
         rectangle((0.8, 0.4, 0.3), (0.0, 0.2, 0.0), (0.0, 0.0, 0.2), material=glow, name="screen"),
     ]
     return scene_of(parts, (panel,), world=(0.3, 0.4, 0.5))

@@ -11,13 +11,13 @@ from addon.core.guides import no_guides
 from addon.core.patch_solution import EVEN, LIGHT
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import surface_receivers
-from addon.core.scene import PointLight
+from addon.core.scene import Material, PointLight
 from addon.core.settings import BakeSettings
 from addon.core.smoothing import texel_grid
 from addon.core.texel_light import NO_TEXEL_LIGHT, texel_light
 from addon.core.texels import texels
 from addon.core.unwrap import unwrap
-from tests.scenes import closed_box, kernel_of
+from tests.scenes import GREY, box, closed_box, kernel_of, rectangle, scene_of
 
 # a cone of three degrees, straight down: a spot 10 cm wide
 SPOT = PointLight("spot", (0.5, 0.5, 0.9), (40.0, 40.0, 40.0), cone_cosines=(0.9984, 0.9986))
@@ -34,9 +34,16 @@ def texels_of(scene):
     return receivers, light
 
 
+def box_with_cloth():
+    """A closed box, and in the beam a cloth that half of it passes."""
+    cloth = Material("cloth", (0.8,) * 3, transmittance=(0.5,) * 3)
+    walls = box((0, 0, 0), (1, 1, 1), inwards=True, material=GREY, name="box")
+    return scene_of([walls, rectangle((0.2, 0.2, 0.4), (0.6, 0, 0), (0, 0.6, 0), material=cloth)], (SPOT,))
+
+
+@pytest.mark.parametrize("scene", [closed_box(lights=(SPOT,)), box_with_cloth()], ids=["box", "cloth"])
 @pytest.mark.parametrize("has_texels", [False, True], ids=["from patches", "from texel to texel"])
-def test_bright_sides_as_lights_give_what_rays_find_of_them(has_texels):
-    scene = closed_box(lights=(SPOT,))
+def test_bright_sides_as_lights_give_what_rays_find_of_them(has_texels, scene):
     with kernel_of(scene, 2) as kernel:
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, BakeSettings(error=0.02), lambda done: None)
@@ -48,10 +55,10 @@ def test_bright_sides_as_lights_give_what_rays_find_of_them(has_texels):
         job = job.part(np.arange(0, len(receivers), 8))
         unlit = replace(patches, kinds=np.where(patches.kinds == LIGHT, EVEN, patches.kinds).astype(np.uint8))
 
-        def light_of(job):
-            return (job.direct(256, 1)[0] + job.gathered(2048, 2)[0]) @ LUMINANCE
+        def light_of(job, rays):
+            return (job.direct(256, 1)[0] + job.gathered(rays, 2)[0]) @ LUMINANCE
 
-        sampled = light_of(job)
-        found = light_of(replace(job, solved=replace(solved, patches=unlit, sources=emitters)))
-    # some hundred receivers with 8192 rays each, of which one in some hundred finds the spot
+        sampled = light_of(job, 2048)
+        found = light_of(replace(job, solved=replace(solved, patches=unlit, sources=emitters)), 16384)
+    # some hundred receivers with 65536 rays each, of which one in some hundred finds the spot
     assert sampled.mean() == pytest.approx(found.mean(), rel=0.02)

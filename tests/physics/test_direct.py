@@ -205,7 +205,7 @@ def test_half_a_sky_gives_half_the_light():
 
 def test_light_passes_through_glass_and_takes_its_tint(points):
     tint = (0.9, 0.5, 0.1)
-    pane = rectangle((-9, -9, 0.5), (18, 0, 0), (0, 18, 0), material=Material("glass", transmittance=tint))
+    pane = rectangle((-9, -9, 0.5), (18, 0, 0), (0, 18, 0), material=Material("glass", (0, 0, 0), transmittance=tint))
     lamp = PointLight("lamp", (0.3, -0.2, 1.5), tuple(COLOUR))
     behind, _ = direct_light([lamp], points, [pane])
     assert behind == pytest.approx(direct_light([lamp], points)[0] * tint, rel=1e-5)

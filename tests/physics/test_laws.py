@@ -40,11 +40,20 @@ def test_what_leaves_an_open_scene_is_counted():
 
 def test_tinted_glass_takes_what_it_takes():
     """A pane over the whole floor of a room takes half of what the floor sends; both ways alike."""
-    glass = Material("glass", transmittance=(0.5, 0.5, 0.5))
+    glass = Material("glass", (0, 0, 0), transmittance=(0.5, 0.5, 0.5))
     laws, _ = laws_of(scene_of([*walls(), rectangle((0, 0, 0.2), (1, 0, 0), (0, 1, 0), material=glass)]))
     # half of what passes the pane from below; half of the group's area is the ceiling's back, which sees nothing
     lost = c11(1, 1, 0.2) / 2 / 2
     assert laws.closure == pytest.approx(lost, abs=3 * np.sqrt(lost / RAYS))
+    assert laws.reciprocity < 2 * NOISE
+
+
+def test_cloth_takes_no_more_than_it_gives():
+    """What meets the cloth lands there, the rest passes: nothing is lost, and both ways are alike."""
+    cloth = Material("cloth", (0.5,) * 3, transmittance=(0.3,) * 3)
+    laws, _ = laws_of(scene_of([*walls(), rectangle((0, 0, 0.4), (1, 0, 0), (0, 1, 0), material=cloth)]))
+    assert laws.closure == 0
+    # what passes by chance is not stratified as directions are
     assert laws.reciprocity < 2 * NOISE
 
 

@@ -87,7 +87,9 @@ def test_what_is_shot_is_absorbed_or_escapes_or_is_not_shot_yet(choice, scene):
 @pytest.mark.parametrize("choice", ["progressive", "stochastic"])
 def test_tinted_glass_takes_its_share_in_the_balance(choice):
     """A glass pane that absorbs half of what passes: the balance holds for scenes with glass, too."""
-    pane = rectangle((0, 0, 0.5), (1, 0, 0), (0, 1, 0), material=Material("glass", transmittance=(0.5, 0.5, 0.5)))
+    pane = rectangle(
+        (0, 0, 0.5), (1, 0, 0), (0, 1, 0), material=Material("glass", (0, 0, 0), transmittance=(0.5, 0.5, 0.5))
+    )
     plates = [rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0)), rectangle((0, 0, 1), (0, 1, 0), (1, 0, 0))]
     _, solution = solve(scene_of([*plates, pane]), choice, one_lit_wall)
     energy = solution.energy

@@ -1,0 +1,134 @@
+/* Light through triangles that let some of it pass: glass, thin cloth, what an image cuts out.
+ * SPDX-License-Identifier: GPL-3.0-or-later */
+#include "clear.h"
+
+#include "sampling.h"
+
+#include <stdlib.h>
+
+enum { MOST_FACES = 256 }; /* a guard against a stack of faces so close that the distance no longer grows */
+
+static bool maps_are_valid(const pl_clear *clear, size_t triangle_count) {
+    for (size_t map = 0; map < clear->map_count; ++map) {
+        const int32_t *shape = clear->map_shapes + 3 * map;
+        if (shape[0] < 0 || shape[1] < 1 || shape[2] < 1 ||
+            (uint64_t)shape[0] + (uint64_t)shape[1] * (uint64_t)shape[2] > clear->pixel_count)
+            return false;
+    }
+    for (size_t t = 0; t < triangle_count; ++t)
+        if (clear->maps[t] < -1 || (clear->maps[t] >= 0 && (size_t)clear->maps[t] >= clear->map_count))
+            return false;
+    return true;
+}
+
+pl_status clear_copy(const pl_clear *from, size_t triangle_count, pl_clear *out_clear) {
+    if (!maps_are_valid(from, triangle_count))
+        return PL_ERR_ARGUMENT;
+    *out_clear = (pl_clear){.transmittance = copy_of(from->transmittance, 3 * sizeof(float) * triangle_count),
+                            .stops = copy_of(from->stops, triangle_count),
+                            .maps = copy_of(from->maps, sizeof(int32_t) * triangle_count),
+                            /* without a map nothing is looked up, and three million triangles have 72 MB of these */
+                            .uvs = copy_of(from->uvs, from->map_count ? 6 * sizeof(float) * triangle_count : 0),
+                            .map_shapes = copy_of(from->map_shapes, 3 * sizeof(int32_t) * from->map_count),
+                            .map_count = from->map_count,
+                            .pixels = copy_of(from->pixels, 3 * sizeof(float) * from->pixel_count),
+                            .pixel_count = from->pixel_count};
+    const bool is_complete = out_clear->transmittance && out_clear->stops && out_clear->maps && out_clear->uvs &&
+                             out_clear->map_shapes && out_clear->pixels;
+    return is_complete ? PL_OK : PL_ERR_MEMORY;
+}
+
+void clear_destroy(pl_clear *clear) {
+    const void *const copies[] = {clear->transmittance, clear->stops,      clear->maps,
+                                  clear->uvs,           clear->map_shapes, clear->pixels};
+    for (size_t k = 0; k < sizeof copies / sizeof *copies; ++k)
+        free((void *)copies[k]);
+}
+
+/* A place along a side of a map that repeats, from -0.5 at its begin to size - 0.5; 0 of what is not a number. */
+static float place_along(float coordinate, int32_t size) {
+    const float repeated = coordinate - floorf(coordinate);
+    return (repeated >= 0 && repeated <= 1 ? repeated : 0) * (float)size - 0.5f;
+}
+
+/* Multiply io_rgb by a map, bilinearly. */
+static void multiply_by_map(const pl_clear *clear, int32_t map, float u, float v, float io_rgb[3]) {
+    const int32_t height = clear->map_shapes[3 * map + 1], width = clear->map_shapes[3 * map + 2];
+    const float *pixels = clear->pixels + 3 * (size_t)clear->map_shapes[3 * map];
+    const float x = place_along(u, width), y = place_along(v, height);
+    const float right = x - floorf(x), up = y - floorf(y);
+    const int32_t column = (int32_t)floorf(x), row = (int32_t)floorf(y);
+    float sum[3] = {0, 0, 0};
+    for (int corner = 0; corner < 4; ++corner) {
+        const int is_right = corner & 1, is_up = corner >> 1;
+        const size_t c = (size_t)((column + is_right + width) % width), r = (size_t)((row + is_up + height) % height);
+        const float weight = (is_right ? right : 1 - right) * (is_up ? up : 1 - up);
+        for (size_t k = 0; k < 3; ++k)
+            sum[k] += weight * pixels[3 * (r * (size_t)width + c) + k];
+    }
+    for (int k = 0; k < 3; ++k)
+        io_rgb[k] *= sum[k];
+}
+
+/* What a clear triangle lets through at the point hit. */
+static void transmittance_at(const pl_clear *clear, const pl_hit *hit, float out_rgb[3]) {
+    const size_t triangle = (size_t)hit->triangle;
+    for (size_t k = 0; k < 3; ++k)
+        out_rgb[k] = clear->transmittance[3 * triangle + k];
+    if (clear->maps[triangle] < 0)
+        return;
+    const float *uv = clear->uvs + 6 * triangle;
+    const float u = uv[0] + hit->u * (uv[2] - uv[0]) + hit->v * (uv[4] - uv[0]);
+    const float v = uv[1] + hit->u * (uv[3] - uv[1]) + hit->v * (uv[5] - uv[1]);
+    multiply_by_map(clear, clear->maps[triangle], u, v, out_rgb);
+}
+
+/* A number of [0, 1) that hangs on nothing but where a ray hits. */
+static float number_of(const pl_hit *hit) {
+    const union {
+        float number;
+        uint32_t bits;
+    } u = {hit->u}, v = {hit->v}, distance = {hit->distance};
+    return unit_float(hash_pair(hash_pair(u.bits, v.bits), hash_pair(distance.bits, (uint32_t)hit->triangle)));
+}
+
+bool transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, float io_rgb[3]) {
+    float near = 0;
+    if (!scene->clear_layer.bvh)
+        return true;
+    for (int faces = 0; faces < MOST_FACES; ++faces) {
+        const pl_hit hit = clear_hit(scene, origin, direction, near, far);
+        if (hit.triangle < 0)
+            break;
+        float through[3];
+        transmittance_at(&scene->clear, &hit, through);
+        for (int k = 0; k < 3; ++k)
+            io_rgb[k] *= through[k];
+        near = nextafterf(hit.distance, INFINITY);
+    }
+    return io_rgb[0] > 0 || io_rgb[1] > 0 || io_rgb[2] > 0;
+}
+
+pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_rgb[3]) {
+    const pl_hit end = closest_hit(scene, origin, direction, 0);
+    float near = 0;
+    if (!scene->clear_layer.bvh)
+        return end;
+    for (int faces = 0; faces < MOST_FACES; ++faces) {
+        const pl_hit hit = clear_hit(scene, origin, direction, near, end.distance);
+        if (hit.triangle < 0)
+            break;
+        float through[3], passing = 1;
+        transmittance_at(&scene->clear, &hit, through);
+        if (scene->clear.stops[hit.triangle]) {
+            /* exact for grey: nothing is lost then */
+            passing = through[1] + ((through[0] - through[1]) + (through[2] - through[1])) / 3;
+            if (number_of(&hit) >= passing)
+                return hit;
+        }
+        for (int k = 0; k < 3; ++k)
+            io_rgb[k] *= through[k] / passing;
+        near = nextafterf(hit.distance, INFINITY);
+    }
+    return end;
+}
