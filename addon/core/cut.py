@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
 
 import numpy as np
 
 from .charts import TargetSurface, weld
+from .settings import SettingsError
 
 # Triangles below 1.2e-7 square units have no place for xatlas, whatever the scene's size; meshes are handed over scaled
 # so that nearly all triangles are far above, and not larger than float32 holds.
@@ -57,9 +59,10 @@ def _xatlas():
     try:
         import xatlas
     except ImportError as error:
-        raise ImportError(
-            f"unwrapping needs the package xatlas, which cannot be loaded ({error}): install xatlas==0.0.11, "
-            "or keep the UVs that the objects have"
+        python = ".".join(map(str, sys.version_info[:2]))
+        raise SettingsError(
+            f"unwrapping needs the package xatlas==0.0.11, which cannot be loaded ({error}; it has wheels for Python 3.8 "
+            f"to 3.13, this is {python}): keep the UVs that the objects have, or bake vertex colours"
         ) from error
     return xatlas
 

@@ -75,7 +75,7 @@ def test_holds_the_add_on_and_nothing_else(extension_zip):
     )
     assert all(name.startswith("wheels/") and name.endswith(".whl") for name in rest), rest
     assert sorted(Path(name).name.split("-")[0] + Path(name).name.split("-")[2] for name in rest) == [
-        *("embreexcp311", "embreexcp313", "xatlascp311", "xatlascp313"),
+        *("embreexcp311", "embreexcp313", "embreexcp314", "xatlascp311", "xatlascp313"),
     ]
 
 

@@ -227,7 +227,7 @@ def test_uvs_that_cannot_be_kept_are_refused(uvs, message):
 
 def test_missing_xatlas_is_said(monkeypatch):
     monkeypatch.setitem(sys.modules, "xatlas", None)
-    with pytest.raises(ImportError, match="unwrapping needs the package xatlas"):
+    with pytest.raises(SettingsError, match="unwrapping needs the package xatlas"):
         unwrap(scene_of(box()), BakeSettings())
 
 
