@@ -95,7 +95,7 @@ def _ramp(reached, reading):
     try:
         factor = grey(reading.readable_colour(reached.feeding(0)))
     except Unreadable as error:
-        reading.say(f"a Color Ramp of its colours hangs on a {error}, which cannot be read: the ramp's mean is used")
+        reading.guess(f"a Color Ramp of its colours hangs on a {error}, which cannot be read: the ramp's mean is used")
         return Colour(table.mean(axis=0))
     if ramp.interpolation == "CONSTANT":
         return pointwise(lambda c: table[(np.clip(c[..., 0], 0, 1) * (TABLE - 1)).astype(int)], factor)

@@ -10,7 +10,9 @@ import numpy as np
 
 from ..core.scene import BRIGHTEST, Material
 from .colour_nodes import grey, read_colour_node
+from .private_render import RenderError
 from .read_images import Images
+from .render_colours import ShaderInput, rendered_means
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
@@ -30,12 +32,13 @@ BY_VIEW = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "NEW_GEOMETRY"}
 
 
 class Materials:
-    """The materials of one scene, each read once; ``entries[i]`` has the coordinates ``coordinates[i]``."""
+    """The materials of one scene; ``entries[i]`` has the coordinates ``coordinates[i]``, and is final once finished."""
 
     def __init__(self, depsgraph, warn):
         self.entries = [NO_MATERIAL]
         self.coordinates = [Coordinates()]
         self._indices = {}
+        self._readings = [None]
         self._depsgraph = depsgraph
         self._warn = warn
         self._images = Images(warn)
@@ -50,9 +53,29 @@ class Materials:
             self._indices[key] = len(self.entries)
             self.entries.append(reading.material())
             self.coordinates.append(reading.coordinates())
-            for sentence in reading.sentences():
-                self._warn(f"material '{material.name}': {sentence}")
+            self._readings.append(reading)
         return self._indices[key]
+
+    def finish(self) -> None:
+        """Have Cycles tell what could not be read, in one render for all, and say what is noteworthy."""
+        inputs = [place for reading in self._readings[1:] for place in reading.guessed]
+        means = self._rendered(inputs) if inputs else {}
+        for row, reading in enumerate(self._readings[1:], 1):
+            told = {place: means[place] for place in reading.guessed if place in means}
+            if told:
+                original = next(iter(told)).material  # what was evaluated may be gone after a render
+                reading = MaterialReading(original.evaluated_get(self._depsgraph), self._images, told)
+                self.entries[row] = reading.material()
+            for sentence in reading.sentences():
+                self._warn(f"material '{self.entries[row].name}': {sentence}")
+
+    def _rendered(self, inputs):
+        try:
+            means = rendered_means(inputs, self._depsgraph.scene.frame_current)
+        except RenderError as error:
+            self._warn(f"what cannot be read of materials cannot be rendered either: {error}")
+            return {}
+        return {place: mean for place, mean in zip(inputs, means) if mean is not None}
 
 
 ALL = Colour(np.ones(3))
@@ -66,21 +89,28 @@ def rest_of(share: Colour) -> Colour:
 
 
 class Notes:
-    """What is to be remembered of nodes that were read, each once: images' coordinates, sentences for the report."""
+    """What is to be remembered of nodes that were read, each once: images' coordinates, sentences for the report, and
+    those that say what was guessed."""
 
     def __init__(self):
-        self.coordinates, self.sentences = {}, {}
+        self.coordinates, self.sentences, self.guesses = {}, {}, {}
 
     def add(self, other) -> None:
         self.coordinates |= other.coordinates
         self.sentences |= other.sentences
+        self.guesses |= other.guesses
 
 
 class MaterialReading:
-    """One material being read, each node once; what is noted of a node that turns out unreadable is forgotten."""
+    """One material being read, each node once; what is noted of a node that turns out unreadable is forgotten.
 
-    def __init__(self, blender_material, images):
-        self._material = blender_material
+    ``told`` are the mean colours of shaders' inputs that need not be guessed, ``guessed`` those inputs that were.
+    """
+
+    def __init__(self, blender_material, images, told=None):
+        self.blender_material = blender_material
+        self.guessed: dict[ShaderInput, bool] = {}
+        self._told = told or {}
         self._images = images
         self._notes = Notes()
         self._read = {}
@@ -93,7 +123,7 @@ class MaterialReading:
         reflectance, radiance = surface.reflectance_of_the_rest.within(1.0), surface.radiance.within(BRIGHTEST)
         transmittance = surface.transmittance.within(1.0)
         return Material(
-            self._material.name,
+            self.blender_material.name,
             tuple(float(x) for x in reflectance.value),
             reflectance.texture,
             tuple(float(x) for x in radiance.value),
@@ -111,13 +141,13 @@ class MaterialReading:
 
     def sentences(self) -> list[str]:
         """For the report."""
-        return list(self._notes.sentences)
+        return list(self._notes.sentences | self._notes.guesses)
 
     def _surface(self) -> Surface:
-        if not self._material.use_nodes or self._material.node_tree is None:
+        if not self.blender_material.use_nodes or self.blender_material.node_tree is None:
             return Surface(self._viewport_colour())
         try:
-            shader = surface_shader(self._material.node_tree)
+            shader = surface_shader(self.blender_material.node_tree)
             return Surface() if shader is None else self._shader(shader)
         except Unreadable as error:
             self._notes = Notes()
@@ -133,14 +163,14 @@ class MaterialReading:
         if kind == "EMISSION":
             return Surface(radiance=self._emitted(reached, "Color", "Strength"))
         if kind in DIFFUSE:
-            return Surface(self._colour(reached.feeding(DIFFUSE[kind])))
+            return Surface(self._colour(reached, DIFFUSE[kind]))
         if kind in GLOSSY:
             self.say(f"its {reached.node.bl_label} is baked as diffuse")
-            return Surface(self._colour(reached.feeding(GLOSSY[kind])))
+            return Surface(self._colour(reached, GLOSSY[kind]))
         if kind in PASSING:
-            return Surface(transmittance=self._colour(reached.feeding("Color")).within(1.0))
+            return Surface(transmittance=self._colour(reached, "Color").within(1.0))
         if kind == "MIX_SHADER":
-            factor = self._mix_factor(reached.feeding(0))
+            factor = self._mix_factor(reached)
             return self._sum(((rest_of(factor), reached.feeding(1)), (factor, reached.feeding(2))))
         if kind == "ADD_SHADER":
             return self._sum(((ALL, reached.feeding(0)), (ALL, reached.feeding(1))))
@@ -152,7 +182,7 @@ class MaterialReading:
         return weighted_sum([(weight, self._shader(reached)) for weight, reached in parts if not weight.is_black])
 
     def _principled(self, reached) -> Surface:
-        base = self._colour(reached.feeding("Base Color")).within(1.0)
+        base = self._colour(reached, "Base Color").within(1.0)
         transmission = self._number(reached, "Transmission Weight")
         radiance = self._emitted(reached, "Emission Color", "Emission Strength")
         if transmission >= 0.5:
@@ -164,16 +194,16 @@ class MaterialReading:
 
     def _alpha(self, reached) -> Colour:
         try:
-            return self._share(reached.feeding("Alpha"))
+            return self._as_told(reached, "Alpha", self._share)
         except Unreadable as error:
-            self.say(f"its alpha comes from a {error}, which cannot be read: it is baked opaque")
+            self.guess(f"its alpha comes from a {error}, which cannot be read: it is baked opaque")
             return ALL
 
     def _emitted(self, reached, colour_name, strength_name) -> Colour:
         strength = self._number(reached, strength_name)
         if strength == 0:  # whatever the colour is, it need not be readable
             return Colour(np.zeros(3))
-        return self._colour(reached.feeding(colour_name)).scaled(strength)
+        return self._colour(reached, colour_name).scaled(strength)
 
     def _number(self, reached, name) -> float:
         try:
@@ -183,14 +213,14 @@ class MaterialReading:
             self.say(f"its {name} comes from a {error}, which cannot be read: {value:g} is used")
             return value
 
-    def _mix_factor(self, reached) -> Colour:
+    def _mix_factor(self, mix) -> Colour:
         try:
-            return self._share(reached)
+            return self._as_told(mix, 0, self._share)
         except Unreadable as error:
-            if reached.node.type in BY_VIEW:
+            if mix.feeding(0).node.type in BY_VIEW:
                 self.say(f"its shaders are mixed by a {error}: the first one is used")
                 return Colour(np.zeros(3))
-            self.say(f"its shaders are mixed by a {error}: they are mixed evenly")
+            self.guess(f"its shaders are mixed by a {error}: they are mixed evenly")
             return Colour(np.full(3, 0.5))
 
     def _share(self, reached) -> Colour:
@@ -207,16 +237,40 @@ class MaterialReading:
         try:
             return grey(self.readable_colour(reached))
         except Unreadable as error:
-            value = 0.0 if reached.node.type in BY_VIEW else usual
-            self.say(f"its colour hangs on a {error}, which cannot be read: {value:g} is used for it")
+            by_view = reached.node.type in BY_VIEW
+            value, note = (0.0, self.say) if by_view else (usual, self.guess)
+            note(f"its colour hangs on a {error}, which cannot be read: {value:g} is used for it")
             return Colour(np.full(3, value))
 
-    def _colour(self, reached) -> Colour:
+    def _colour(self, shader, name) -> Colour:
         try:
-            return self.readable_colour(reached)
+            return self._as_told(shader, name, self.readable_colour)
         except Unreadable as error:
-            self.say(f"its {error} cannot be read: the viewport colour is used")
+            self.guess(f"its {error} cannot be read: the viewport colour is used")
             return self._viewport_colour()
+
+    def _as_told(self, shader, name, read) -> Colour:
+        """What ``read`` makes of a shader's input; where it has to guess, with the mean that was told, if it was."""
+        reached, socket = shader.feeding(name), shader.node.inputs[name]
+        place = ShaderInput(self.blender_material.original, shader.node.name, socket.identifier)
+        outer, self._notes = self._notes, Notes()
+        try:
+            found, unreadable = read(reached), None
+        except Unreadable as error:
+            found, unreadable = None, error
+        finally:
+            inner, self._notes = self._notes, outer
+        # what the view decides has no mean, and the names of nodes in groups say nothing outside
+        is_guess = inner.guesses or (unreadable and reached.node.type not in BY_VIEW)
+        if is_guess and not shader.groups:
+            self.guessed[place] = True
+            if place in self._told:
+                inner.guesses = {f"its {socket.name} is what Cycles shows of it, on the mean of a square metre": True}
+                found, unreadable = _with_mean(found, self._told[place]), None
+        self._notes.add(inner)
+        if unreadable:
+            raise unreadable
+        return found
 
     def readable_colour(self, reached) -> Colour:
         """The colour that is reached; Unreadable where it, or a node that makes it, is not known."""
@@ -257,8 +311,19 @@ class MaterialReading:
         return colour
 
     def _viewport_colour(self) -> Colour:
-        return Colour(np.clip(np.array(self._material.diffuse_color[:3], float), 0.0, 1.0))
+        return Colour(np.clip(np.array(self.blender_material.diffuse_color[:3], float), 0.0, 1.0))
 
     def say(self, sentence):
         """Note something for the report."""
         self._notes.sentences[sentence] = True
+
+    def guess(self, sentence):
+        """Note for the report what has to be guessed, unless it is told."""
+        self._notes.guesses[sentence] = True
+
+
+def _with_mean(colour: Colour | None, mean) -> Colour:
+    """The mean (3,), varying as a colour does that was guessed from images, where one was."""
+    if colour is None or colour.texture is None or not colour.mean.all():
+        return Colour(mean)
+    return colour.scaled(mean / colour.mean)

@@ -111,6 +111,7 @@ class SceneReading:
         """All that was read, as one core Scene."""
         lights = read_lights(self.depsgraph, self.visibility, self.warn)
         world_radiance, environment = read_world(world, self.depsgraph, self.warn)
+        self.materials.finish()
         first_vertices = np.cumsum([0] + [len(p.vertices) for p in self.placed])
         vertices = _joined([p.vertices for p in self.placed], np.float64, (0, 3))
         triangles = [p.triangles + first for p, first in zip(self.placed, first_vertices)]

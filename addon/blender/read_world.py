@@ -7,8 +7,9 @@ from mathutils import Euler
 
 from ..core.environment import UNTURNED, Environment
 from ..core.scene import BRIGHTEST
+from .private_render import RenderError
 from .read_images import linear_pixels
-from .render_world import WorldError, rendered_world
+from .render_world import rendered_world
 from .shader_nodes import Unreadable, constant, constant_colour, constant_vector, surface_shader
 
 BLACK = (0.0, 0.0, 0.0)
@@ -45,7 +46,7 @@ def _rendered(world, depsgraph, unreadable, warn):
         warn(f"world '{world.name}': its volume is left out")
     try:
         pixels = rendered_world(world, depsgraph.scene.frame_current)
-    except WorldError as error:
+    except RenderError as error:
         warn(f"world '{world.name}': its {unreadable} cannot be read ({error}): its viewport colour is used")
         return _radiance(world.color, 1.0), None
     return WHITE, Environment(world.name, np.clip(np.nan_to_num(pixels, posinf=0.0), 0.0, BRIGHTEST))

@@ -61,8 +61,8 @@ def _xatlas():
     except ImportError as error:
         python = ".".join(map(str, sys.version_info[:2]))
         raise SettingsError(
-            f"unwrapping needs the package xatlas==0.0.11, which cannot be loaded ({error}; it has wheels for Python 3.8 "
-            f"to 3.13, this is {python}): keep the UVs that the objects have, or bake vertex colours"
+            f"unwrapping needs the package xatlas==0.0.11, which cannot be loaded ({error}; it has wheels for Python "
+            f"3.8 to 3.13, this is {python}): keep the UVs that the objects have, or bake vertex colours"
         ) from error
     return xatlas
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from addon.blender.colour_nodes import blackbody
+from addon.blender.private_render import RenderError
 from addon.blender.read_scene import read_scene
 
 pytestmark = pytest.mark.usefixtures("empty_file")
@@ -270,7 +271,17 @@ def read_with_warnings(plane, material):
     return scene.materials[scene.triangle_materials[0]], scene.warnings
 
 
-def test_colours_mixed_by_noise_are_mixed_evenly_and_it_is_said(nodes, plane):
+@pytest.fixture
+def without_renders(monkeypatch):
+    """Have every render fail that would tell what cannot be read."""
+
+    def fail(*_):
+        raise RenderError("a render is running")
+
+    monkeypatch.setattr("addon.blender.read_materials.rendered_means", fail)
+
+
+def test_colours_mixed_by_noise_are_mixed_evenly_where_nothing_tells_and_it_is_said(nodes, plane, without_renders):
     material, tree = nodes("Wall")
     node = tree.new("Mix")
     node.data_type = "RGBA"
@@ -279,19 +290,20 @@ def test_colours_mixed_by_noise_are_mixed_evenly_and_it_is_said(nodes, plane):
     tree.show(tree.link(node, tree.new("BsdfDiffuse"), 2, "Color"))
     found, warnings = read_with_warnings(plane, material)
     np.testing.assert_allclose(found.reflectance, (0.5, 0.5, 0.25), atol=1e-6)  # luminance weights, in 64 bits
-    assert len(warnings) == 1
-    assert "'Wall'" in warnings[0]
-    assert "Noise Texture" in warnings[0]
+    assert len(warnings) == 2
+    assert "a render is running" in warnings[0]
+    assert "'Wall'" in warnings[1]
+    assert "Noise Texture" in warnings[1]
 
 
-def test_a_ramp_of_noise_is_its_mean_and_it_is_said(nodes, plane):
+def test_a_ramp_of_noise_is_its_mean_where_nothing_tells_and_it_is_said(nodes, plane, without_renders):
     material, tree = nodes("Wood")
     ramp = tree.link(tree.new("TexNoise"), tree.new("ValToRGB"), 0, 0)
     tree.show(tree.link(ramp, tree.new("BsdfDiffuse"), 0, "Color"))
     found, warnings = read_with_warnings(plane, material)
     np.testing.assert_allclose(found.reflectance, [0.5] * 3, atol=1e-6)  # black to white
-    assert len(warnings) == 1
-    assert "'Wood'" in warnings[0]
+    assert len(warnings) == 2
+    assert "'Wood'" in warnings[1]
 
 
 def test_an_alpha_image_cuts_out_what_it_says(nodes, plane):

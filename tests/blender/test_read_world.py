@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.blender.private_render import RenderError
 from addon.blender.read_scene import read_scene
-from addon.blender.render_world import WorldError
 from addon.core.bake import bake
 from addon.core.environment import Environment
 from addon.core.settings import BakeSettings
@@ -252,7 +252,7 @@ def test_a_world_that_cannot_be_rendered_is_never_silently_black(set_world, read
     tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs[0], background.inputs["Color"])
 
     def fail(world, frame):
-        raise WorldError("out of memory")
+        raise RenderError("out of memory")
 
     monkeypatch.setattr("addon.blender.read_world.rendered_world", fail)
     scene = read()
