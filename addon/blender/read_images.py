@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.scene import BRIGHTEST, Texture
+from .mesh_colours import palette
 from .shader_nodes import Unreadable
 
 # Bounced light does not see texels finer than this; an 8k texture would cost a gigabyte.
@@ -19,6 +20,7 @@ class Images:
     def __init__(self, warn):
         self._textures = {}
         self._warn = warn
+        self.of_meshes = palette()  # of all that have colours
 
     def texture(self, image) -> Texture:
         """The image as linear Rec.709 pixels; Unreadable where it has none."""

@@ -10,12 +10,14 @@ import numpy as np
 
 from ..core.scene import BRIGHTEST, Material
 from .colour_nodes import grey, read_colour_node
+from .mesh_colours import MeshColours
 from .private_render import RenderError
 from .read_images import Images
 from .render_colours import ShaderInput, rendered_means
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
+from .write_vertex_colours import ATTRIBUTE
 
 NO_MATERIAL = Material("no material")
 
@@ -27,6 +29,7 @@ GLOSSY = {
     "EEVEE_SPECULAR": "Base Color",
 }
 PASSING = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSLUCENT"}
+COLOURS_OF_MESH = {"VERTEX_COLOR": "layer_name", "ATTRIBUTE": "attribute_name"}  # nodes, and what names the attribute
 # Their output depends on the ray: 0 is head-on, and not a camera ray, which is what bounced light mostly sees.
 BY_VIEW = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "NEW_GEOMETRY"}
 
@@ -114,10 +117,15 @@ class MaterialReading:
         self._images = images
         self._notes = Notes()
         self._read = {}
+        self._takes_mesh_colours = True
 
     def material(self) -> Material:
         """The core material; never silently black."""
         surface = self._surface()
+        if len(self._notes.coordinates) > 1 and any(isinstance(kind, MeshColours) for kind in self._notes.coordinates):
+            # a triangle has one place in textures: its image's
+            self._takes_mesh_colours, self._notes, self._read, self.guessed = False, Notes(), {}, {}
+            surface = self._surface()
         if not surface.transmittance.is_black and surface.reflectance_of_the_rest.largest > 1.01:
             self.say("it reflects one colour and passes another: some of what it reflects is lost")
         reflectance, radiance = surface.reflectance_of_the_rest.within(1.0), surface.radiance.within(BRIGHTEST)
@@ -132,7 +140,7 @@ class MaterialReading:
             transmittance.texture,
         )
 
-    def coordinates(self) -> Coordinates:
+    def coordinates(self) -> Coordinates | MeshColours:
         """The coordinates of the first image; a second kind is named."""
         kinds = list(self._notes.coordinates)
         if len(kinds) > 1:
@@ -294,7 +302,18 @@ class MaterialReading:
             return Colour(constant_colour(reached))
         if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
+        if reached.node.type in COLOURS_OF_MESH and reached.socket.identifier == "Color":
+            return self._mesh_colour(reached)
         return read_colour_node(reached, self)
+
+    def _mesh_colour(self, reached) -> Colour:
+        """A colour attribute's, but for those that this add-on has put there: they are light."""
+        attribute = getattr(reached.node, COLOURS_OF_MESH[reached.node.type])
+        is_elsewhere = getattr(reached.node, "attribute_type", "GEOMETRY") != "GEOMETRY"
+        if is_elsewhere or attribute == ATTRIBUTE or not self._takes_mesh_colours:
+            raise Unreadable(f"{reached.node.bl_label} node")
+        self._notes.coordinates[MeshColours(attribute)] = True
+        return Colour(np.ones(3), self._images.of_meshes)
 
     def _image_colour(self, reached) -> Colour:
         if reached.node.image is None:

@@ -8,6 +8,7 @@ import numpy as np
 
 LIGHTMAP_LAYER = "Lightmap"
 FLAT_DEG = 2.0  # at the most do flat-shaded faces of one plane meet at, in the mesh's own space: nothing parts them
+VALUES = {"FLOAT_COLOR": ("color", 4), "BYTE_COLOR": ("color", 4), "FLOAT_VECTOR": ("vector", 3), "FLOAT": ("value", 1)}
 INFINITE = 1e15  # Blender stores an infinite coordinate as the largest float
 
 
@@ -27,6 +28,7 @@ class MeshArrays:
     sharp_edges : bool (T, 3) edge k runs from corner k to corner k + 1
     uvs : dict, name of a UV layer -> float32 (T, 3, 2)
     render_layer : str, the UV layer that textures use; "" where there is none
+    colours : dict, name of an attribute ("" = the render colours) -> float32 (T, 3), the mean; 0 where there is none
     """
 
     positions: np.ndarray
@@ -39,10 +41,11 @@ class MeshArrays:
     sharp_edges: np.ndarray
     uvs: dict
     render_layer: str
+    colours: dict
 
 
-def read_mesh(mesh, uv_layers=()) -> MeshArrays:
-    """Read a mesh; of its UV layers the render layer, "Lightmap", and those named."""
+def read_mesh(mesh, uv_layers=(), colours=()) -> MeshArrays:
+    """Read a mesh; of its UV layers the render layer, "Lightmap", and those named, of its colours those named."""
     mesh.calc_loop_triangles()
     corners = _read(mesh.loop_triangles, "loops", np.int32, 3)
     polygons = _read(mesh.loop_triangles, "polygon_index", np.int32, 1)
@@ -65,6 +68,7 @@ def read_mesh(mesh, uv_layers=()) -> MeshArrays:
         sharp_edges=is_mesh_edge & edge_sharp[corners],
         uvs={layer.name: _layer_uvs(layer)[corners] for layer in mesh.uv_layers if layer.name in wanted},
         render_layer=render_layer,
+        colours={name: _triangle_colours(mesh, name, corners, polygons) for name in colours},
     )
 
 
@@ -92,6 +96,20 @@ def _read(collection, name, dtype, width):
 def _attribute(mesh, attribute, name, dtype, width):
     found = mesh.attributes.get(attribute)
     return np.zeros((0, width) if width > 1 else 0, dtype) if found is None else _read(found.data, name, dtype, width)
+
+
+def _triangle_colours(mesh, name, corners, polygons):
+    """An attribute's mean over each triangle as a colour, float32 (T, 3); 0 where there is none, as Cycles has it."""
+    render = mesh.color_attributes.render_color_index
+    found = mesh.attributes.get(name) if name else mesh.color_attributes[render] if render >= 0 else None
+    kind, width = VALUES.get(found.data_type, ("", 0)) if found else ("", 0)
+    if not width or found.domain not in {"POINT", "CORNER", "FACE"}:
+        return np.zeros((len(corners), 3), np.float32)
+    values = np.nan_to_num(_read(found.data, kind, np.float32, width).reshape(-1, width))
+    values = values[:, :3] if width > 1 else np.repeat(values, 3, axis=1)
+    if found.domain == "FACE":
+        return values[polygons]
+    return values[corners if found.domain == "CORNER" else corner_vertices(mesh)[corners]].mean(axis=1)
 
 
 def _flags(mesh, attribute, count):

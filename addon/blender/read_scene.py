@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.scene import Scene, SceneError, SceneObject
 from ..core.settings import BakeSettings
+from .mesh_colours import MeshColours
 from .new_meshes import NewMeshes
 from .place_mesh import PlacedMesh, place_mesh, unit_normals
 from .read_lights import read_lights
@@ -22,6 +23,7 @@ from .read_world import read_world
 from .rects import in_lightmap, rect_of
 from .shared_meshes import SharedMeshes, why_not_without
 from .targets import has_faces_of, why_not_modified, why_not_target
+from .texture_coordinates import Coordinates
 from .visibility import Visibility
 
 DEFAULTS = BakeSettings()
@@ -152,8 +154,10 @@ class SceneReading:
             evaluated.to_mesh_clear()
 
     def _append(self, name, target_mesh, evaluated, mesh, matrix):
-        rows, layers = self._slot_materials(evaluated, mesh)
-        arrays = read_mesh(mesh, layers)
+        rows = self._slot_materials(evaluated, mesh)
+        coordinates = [self.materials.coordinates[row] for row in rows]
+        colours = {each.attribute for each in coordinates if isinstance(each, MeshColours)}
+        arrays = read_mesh(mesh, {each.uv_layer for each in coordinates if isinstance(each, Coordinates)}, colours)
         if not (are_finite(arrays.positions) and are_finite(matrix)):
             self.refusals[name] = f"'{name}' has vertices that are not finite (NaN or infinite): it is left out"
             self.warn(self.refusals[name])
@@ -169,24 +173,20 @@ class SceneReading:
         self.target_meshes.append(target_mesh)
 
     def _slot_materials(self, evaluated, mesh):
-        """Rows of ``materials`` by material slot, int32 (slots or 1,), and the UV layers that they ask for."""
+        """Rows of ``materials`` by material slot, int32 (slots or 1,)."""
         materials = list(mesh.materials)
         for index, slot in enumerate(evaluated.material_slots):
             if index >= len(materials):
                 materials.append(slot.material)
             elif slot.link == "OBJECT":
                 materials[index] = slot.material
-        rows = np.array([self.materials.index_of(material) for material in materials or [None]], np.int32)
-        return rows, {self.materials.coordinates[row].uv_layer for row in rows}
+        return np.array([self.materials.index_of(material) for material in materials or [None]], np.int32)
 
     def _texture_uvs(self, arrays: MeshArrays, materials):
         """Each triangle's UVs as its material looks them up, float32 (T, 3, 2)."""
         uvs = np.zeros((len(materials), 3, 2), np.float32)
         for row in np.unique(materials):
-            coordinates = self.materials.coordinates[row]
-            layer = arrays.uvs.get(coordinates.uv_layer or arrays.render_layer)
-            if layer is not None:
-                uvs[materials == row] = coordinates.applied(layer[materials == row])
+            uvs[materials == row] = self.materials.coordinates[row].uvs_of(arrays)[materials == row]
         return uvs
 
     def _is_wanted(self, name):

@@ -19,8 +19,11 @@ class Coordinates:
     uv_layer: str = ""
     affine: tuple[float, ...] = IDENTITY
 
-    def applied(self, uvs) -> np.ndarray:
-        """uvs : float32 (..., 2), mapped."""
+    def uvs_of(self, mesh) -> np.ndarray:
+        """UVs of a read_mesh.MeshArrays' triangles, float32 (T, 3, 2); 0 where it has no such layer."""
+        uvs = mesh.uvs.get(self.uv_layer or mesh.render_layer)
+        if uvs is None:
+            return np.zeros((len(mesh.triangles), 3, 2), np.float32)
         if self.affine == IDENTITY:
             return uvs
         matrix = np.array(self.affine).reshape(2, 3)

@@ -213,13 +213,15 @@ def test_a_uv_map_node_chooses_its_layer(nodes, add_mesh, add_image):
 def test_unreadable_colours_take_the_viewport_colour_and_are_named(nodes, read):
     material, tree = nodes("Marble")
     material.diffuse_color = RED
-    # its colours lie in the mesh: a tile of its own has none to show
-    tree.show(tree.link(tree.new("VertexColor"), tree.new("BsdfDiffuse"), "Color", "Color"))
+    # each object has a colour of its own: a tile has another
+    node = tree.new("Attribute")
+    node.attribute_type, node.attribute_name = "OBJECT", "color"
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), "Color", "Color"))
     found, warnings = read(material)
     assert found.reflectance == RED[:3]
     assert len(warnings) == 1
     assert "'Marble'" in warnings[0]
-    assert "Color Attribute" in warnings[0]
+    assert "Attribute node" in warnings[0]
 
 
 def test_an_unreadable_shader_takes_the_viewport_colour_and_is_named(nodes, read):
