@@ -15,7 +15,8 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 MOST_GROUPS = 96  # groups of glowing triangles: each receiver weighs every group
 GROUP_TRIANGLES = 8  # a group of no more has a closed form in the kernel
-TEXTURE_CUTS = 8  # a triangle whose glow is an image is cut into so many squared
+TEXTURE_CUTS = 8  # a triangle whose glow is an image is cut into so many squared, each with the mean of
+MOST_FINER, TEXTURE_LOOKUPS = 8, 1 << 22  # at the most so many points, squared, and of all of them so many
 
 
 def luminance_of(light):
@@ -99,17 +100,23 @@ def _glowing_triangles(scene):
     is_image = np.array([m.radiance_texture is not None for m in scene.materials], bool)
     plain = np.flatnonzero((emits & ~is_image)[scene.triangle_materials])
     cut = np.flatnonzero((emits & is_image)[scene.triangle_materials])
-    weights, middles = _cuts(TEXTURE_CUTS)
+    weights = _cuts(TEXTURE_CUTS)
 
-    corners, triangles = scene.corners[plain], np.repeat(cut, len(weights))
     pieces = np.einsum("pkb,tbc->tpkc", weights, scene.corners[cut]).reshape(-1, 3, 3)
     factors = np.array([m.radiance for m in scene.materials]).reshape(-1, 3)
-    glow = textured_colours(scene, triangles, np.tile(middles, (len(cut), 1)), "radiance")
-    corners = np.concatenate([corners, pieces])
-    radiances = np.concatenate([factors[scene.triangle_materials[plain]], glow])
+    corners = np.concatenate([scene.corners[plain], pieces])
+    radiances = np.concatenate([factors[scene.triangle_materials[plain]], _glow_of_pieces(scene, cut, weights)])
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     keep = (areas > 0) & (radiances.max(axis=1, initial=0.0) > 0) & _is_first(corners)
     return corners[keep], radiances[keep]
+
+
+def _glow_of_pieces(scene, triangles, weights):
+    """Mean radiance (T * P, 3) of pieces of triangles (T,), of corner weights (P, 3, 3): at many points of each."""
+    finer = int(np.clip((TEXTURE_LOOKUPS / max(len(triangles) * len(weights), 1)) ** 0.5, 1, MOST_FINER))
+    points = np.einsum("sk,pkb->psb", _cuts(finer).mean(axis=1), weights).reshape(-1, 3).astype(np.float32)
+    glow = textured_colours(scene, np.repeat(triangles, len(points)), np.tile(points, (len(triangles), 1)), "radiance")
+    return glow.reshape(-1, finer**2, 3).mean(axis=1)
 
 
 def _is_first(corners):
@@ -121,7 +128,7 @@ def _is_first(corners):
 
 
 def _cuts(n):
-    """A triangle cut into n^2 alike: corner weights (n^2, 3, 3), middles (n^2, 3)."""
+    """A triangle cut into n^2 alike: corner weights (n^2, 3, 3)."""
     pieces = []
     for i in range(n):
         for j in range(n - i):
@@ -129,8 +136,7 @@ def _cuts(n):
             if i + j < n - 1:
                 pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
     ij = np.array(pieces, float) / n
-    weights = np.concatenate([1 - ij.sum(axis=2, keepdims=True), ij], axis=2)
-    return weights, weights.mean(axis=1).astype(np.float32)
+    return np.concatenate([1 - ij.sum(axis=2, keepdims=True), ij], axis=2)
 
 
 def _groups(corners, radiances):
