@@ -32,6 +32,7 @@ CORE_ORDER = (
         "measuring",
         "passes",
         "gather",
+        "backs",
         "lightmap",
         "bake",
     ),

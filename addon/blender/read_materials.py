@@ -28,7 +28,7 @@ GLOSSY = {
     "BSDF_METALLIC": "Base Color",
     "EEVEE_SPECULAR": "Base Color",
 }
-PASSING = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION", "BSDF_TRANSLUCENT"}
+PASSING = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
 COLOURS_OF_MESH = {"VERTEX_COLOR": "layer_name", "ATTRIBUTE": "attribute_name"}  # nodes, and what names the attribute
 # Their output depends on the ray: 0 is head-on, and not a camera ray, which is what bounced light mostly sees.
 BY_VIEW = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "NEW_GEOMETRY"}
@@ -126,10 +126,11 @@ class MaterialReading:
             # a triangle has one place in textures: its image's
             self._takes_mesh_colours, self._notes, self._read, self.guessed = False, Notes(), {}, {}
             surface = self._surface()
-        if not surface.transmittance.is_black and surface.reflectance_of_the_rest.largest > 1.01:
+        reflectance, translucence = surface.of_the_rest(surface.reflectance), surface.of_the_rest(surface.translucence)
+        if not surface.transmittance.is_black and max(reflectance.largest, translucence.largest) > 1.01:
             self.say("it reflects one colour and passes another: some of what it reflects is lost")
-        reflectance, radiance = surface.reflectance_of_the_rest.within(1.0), surface.radiance.within(BRIGHTEST)
-        transmittance = surface.transmittance.within(1.0)
+        reflectance, translucence = reflectance.within(1.0), translucence.within(1.0)
+        radiance, transmittance = surface.radiance.within(BRIGHTEST), surface.transmittance.within(1.0)
         return Material(
             self.blender_material.name,
             tuple(float(x) for x in reflectance.value),
@@ -138,6 +139,8 @@ class MaterialReading:
             radiance.texture,
             tuple(float(x) for x in transmittance.value),
             transmittance.texture,
+            tuple(float(x) for x in translucence.value),
+            translucence.texture,
         )
 
     def coordinates(self) -> Coordinates | MeshColours:
@@ -177,6 +180,8 @@ class MaterialReading:
             return Surface(self._colour(reached, GLOSSY[kind]))
         if kind in PASSING:
             return Surface(transmittance=self._colour(reached, "Color").within(1.0))
+        if kind == "BSDF_TRANSLUCENT":
+            return Surface(translucence=self._colour(reached, "Color").within(1.0))
         if kind == "MIX_SHADER":
             factor = self._mix_factor(reached)
             return self._sum(((rest_of(factor), reached.feeding(1)), (factor, reached.feeding(2))))

@@ -70,29 +70,30 @@ class Colour:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """What a shader does with light, each a share of all of it: reflect it diffusely, emit it, let it pass."""
+    """What a shader does with light, each a share of all of it: reflect it diffusely, emit it, let it pass straight, or
+    diffusely."""
 
     reflectance: Colour = field(default_factory=lambda: Colour(BLACK))
     radiance: Colour = field(default_factory=lambda: Colour(BLACK))
     transmittance: Colour = field(default_factory=lambda: Colour(BLACK))
+    translucence: Colour = field(default_factory=lambda: Colour(BLACK))
 
-    @property
-    def reflectance_of_the_rest(self) -> Colour:
-        """What is reflected of the light that does not pass, by its mean share (core.scene.Material).
+    def of_the_rest(self, scattered: Colour) -> Colour:
+        """Of the light that does not pass straight, by its mean share (core.scene.Material): what is scattered.
 
-        Where all passes, none is reflected, and a mean over what an image cuts out must not see that as black.
+        Where all passes, none is, and a mean over what an image cuts out must not see that as black.
         """
 
-        def divided(reflected, passing):
+        def divided(scattered, passing):
             rest = 1 - passing.mean(axis=-1, keepdims=True)
-            of_all = np.sum(reflected.reshape(-1, 3), axis=0) / max(np.sum(rest), LEAST_REST)
-            return np.where(rest > LEAST_REST, reflected / np.maximum(rest, LEAST_REST), of_all)
+            of_all = np.sum(scattered.reshape(-1, 3), axis=0) / max(np.sum(rest), LEAST_REST)
+            return np.where(rest > LEAST_REST, scattered / np.maximum(rest, LEAST_REST), of_all)
 
-        if self.reflectance.is_black or self.transmittance.is_black:
-            return self.reflectance
+        if scattered.is_black or self.transmittance.is_black:
+            return scattered
         if self.transmittance.texture is None:
-            return self.reflectance.scaled(divided(np.ones(3), self.transmittance.value))
-        return pointwise(divided, self.reflectance, self.transmittance)
+            return scattered.scaled(divided(np.ones(3), self.transmittance.value))
+        return pointwise(divided, scattered, self.transmittance)
 
 
 def weighted_sum(parts) -> Surface:
@@ -102,6 +103,7 @@ def weighted_sum(parts) -> Surface:
         _sum_colours([weight.times(surface.reflectance) for weight, surface in parts]),
         _sum_colours([weight.times(surface.radiance) for weight, surface in parts]),
         _sum_colours([weight.times(surface.transmittance) for weight, surface in parts]),
+        _sum_colours([weight.times(surface.translucence) for weight, surface in parts]),
     )
 
 

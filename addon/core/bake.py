@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .backs import translucent_backs, with_backs
 from .denoiser import open_denoiser
 from .denoising import needs_denoising
 from .emitters import emitters_of
@@ -61,6 +62,10 @@ def bake(
     _require_targets(sound)
     scene = with_suns(sound.scene)
     progress = Progress(on_progress, STAGE_SHARES)
+
+    def seconds_left():
+        return np.inf if settings.time_limit is None else settings.time_limit - progress.elapsed
+
     with (
         Workers(settings.thread_count) as workers,
         open_denoiser(denoiser_library, settings, progress.poll) as (denoise, no_denoiser),
@@ -81,8 +86,12 @@ def bake(
         progress.begin("gather")
         irradiance = gather_irradiance(
             kernel, solved, receivers, grid, seen, settings.error, settings.seed, denoise,
-            lambda: np.inf if settings.time_limit is None else settings.time_limit - progress.elapsed, progress.step,
+            seconds_left, progress.step,
         )  # fmt: skip
+        backs = translucent_backs(scene, kernel, receivers, grid, settings.smooth_angle_deg)
+        if backs is not None:
+            how = settings.error, settings.seed, seconds_left, lambda done: progress.poll()
+            irradiance = with_backs(irradiance, backs, kernel, solved, *how)
 
         progress.begin("texels")
         lightmap = corner_colours = None

@@ -9,7 +9,7 @@ import numpy as np
 from .conjugate_gradient import EXCHANGE_LIMIT
 from .patches import triangle_areas
 from .scene import Scene
-from .settings import BakeSettings
+from .settings import BakeSettings, SettingsError
 
 EXCHANGE_TRIANGLES = 3000  # up to which "auto" takes conjugate gradients, which keep 4 n^2 bytes
 BRIGHT_ROOM = 0.8  # mean reflectance from which conjugate gradients need less time than stochastic Jacobi,
@@ -19,11 +19,17 @@ SIDES = 570  # times 1 / sqrt(1 - rho) as many to be slower: their time grows as
 
 
 def choose(
-    settings: BakeSettings, triangle_count: int, side_count: int, reflectance: float = 0.5, is_rough: bool = False
+    settings: BakeSettings,
+    triangle_count: int,
+    side_count: int,
+    reflectance: float = 0.5,
+    is_rough: bool = False,
+    translucent: str | None = None,
 ) -> tuple[str, str, str]:
     """Solver, method, and a sentence on why, after "auto" has looked at the scene's size and mean reflectance.
 
     ``side_count`` are the sides of the patches that conjugate gradients would start with: thin triangles have many.
+    ``translucent`` names a material that lets light through diffusely, which only stochastic Jacobi solves for.
 
     By time to equal error, measured on closed cubes and the Cornell box of 240 to 12000 sides: rows of form factors and
     conjugate gradients take a third to a tenth of stochastic Jacobi's time at reflectance 0.9, a hundredth at 0.99, up
@@ -32,8 +38,14 @@ def choose(
     as it uses each row for one direction only.
     """
     method = "monte-carlo" if settings.method == "auto" else settings.method
+    if translucent is not None and settings.solver not in ("auto", "stochastic"):
+        raise SettingsError(
+            f"solver is {settings.solver}: material '{translucent}' is translucent, which only stochastic solves for"
+        )
     if settings.solver != "auto":
         return settings.solver, method, f"{settings.solver} and {method} as asked"
+    if translucent is not None:
+        return "stochastic", "monte-carlo", f"stochastic, as material '{translucent}' is translucent"
     fits = triangle_count <= EXCHANGE_TRIANGLES and side_count <= EXCHANGE_LIMIT
     is_quick = side_count <= max(FEW_SIDES, SIDES / math.sqrt(max(1 - reflectance, 1e-9)))
     if method == "hemicube":

@@ -63,7 +63,7 @@ def gather_irradiance(
     solved: Solved,
     receivers: Receivers,
     grid: TexelGrid | VertexGraph,
-    seen: SeenPoints,
+    seen: SeenPoints | None,
     error: float,
     seed: int,
     denoise: Callable | None,
@@ -76,7 +76,7 @@ def gather_irradiance(
     ----------
     solved : the patches' reflected light, and what direct light is sampled from
     grid : the texels that the receivers are, or the vertices' values, over which gathered light is smoothed
-    seen : random points of the surfaces, at which the result is looked up
+    seen : random points of the surfaces, at which the result is looked up, or None
     error : target of the relative error [1]
     denoise : a denoiser.Denoiser, or None
     seconds_left : () -> float, until the time limit [s]; the first pass is always finished
@@ -93,14 +93,19 @@ def gather_irradiance(
     pace = (rays["direct"] + rays["gather"] + learning) / (time.perf_counter() - started)
     passes = within(on_step, 0.4, 0.6)
     gathered = gather_until(job, grid, direct, denoise, error, seed, pace, seconds_left, passes)
-    at_points = measure(job.looking_further(FURTHER).at(seen.receivers), error, seed + 5)
-    # relative to what is there, not to what is shown: light that leaks into the dark has to count as all wrong
-    scale = scale_of_luminance(at_points.luminance)
-    seen_error = rms_of(at_points.squares_of(seen.look_up(gathered.values), scale))
+    seen_error, rays["probe"] = _seen_error(job, seen, gathered.values, error, seed + 5) if seen else (0.0, 0)
     rays["gather"] += learning + gathered.rays
-    rays["probe"] = gathered.probe_rays + at_points.rays
+    rays["probe"] += gathered.probe_rays
     is_met = gathered.rms <= error
     return Irradiance(gathered.values, gathered.rms, seen_error, is_met, gathered.stopped, gathered.is_denoised, rays)
+
+
+def _seen_error(job: GatherJob, seen: SeenPoints, values, error, seed):
+    """How wrong the result is where it is looked up, and the rays that it took to tell."""
+    at_points = measure(job.looking_further(FURTHER).at(seen.receivers), error, seed)
+    # relative to what is there, not to what is shown: light that leaks into the dark has to count as all wrong
+    scale = scale_of_luminance(at_points.luminance)
+    return rms_of(at_points.squares_of(seen.look_up(values), scale)), at_points.rays
 
 
 def _first_looks(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed, on_step):
@@ -137,7 +142,11 @@ def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed, on_st
     """The job whose rays see the texels' light, found by a first ``look`` and mended by others; the rays of these."""
     reach = min(NEAR * grid.spacing, NEAR_SHARE * float(np.ptp(job.receivers.positions, axis=0).max()))
     is_split = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
-    job = replace(job.looking_further(FAR), texel_light=texel_light(grid.uvs, grid.receivers, is_split, reach))
+    # what arrives behind a translucent surface no texel has: rays take what patches show of it
+    seen = grid.receivers
+    if grid.is_translucent.any():
+        seen = np.where((seen >= 0) & ~grid.is_translucent[seen], seen, -1)
+    job = replace(job.looking_further(FAR), texel_light=texel_light(grid.uvs, seen, is_split, reach))
     job.show(grid, direct, look)
     rays, share = 0, 1 / (LOOKS - 1)
     for again in range(1, LOOKS):

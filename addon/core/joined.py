@@ -100,12 +100,19 @@ def _joined_by(kernel: KernelScene, grid: Grid, pieces: Patches, first) -> Patch
     kernel.set_patches(grid.apexes, grid.first_rows, grid.first_cells, first_pieces, owners, pieces.areas)
     shares = np.maximum(pieces.areas, 1e-300)
     total = np.bincount(owners, shares)
-    reflectance = np.stack([np.bincount(owners, shares * channel) / total for channel in pieces.reflectance.T], axis=1)
+
+    def mean(of_pieces):
+        means = np.stack([np.bincount(owners, shares * channel) / total for channel in of_pieces.T], axis=1)
+        return np.minimum(means, 1.0).astype(np.float32)
+
     return replace(
         pieces,
         areas=np.bincount(owners, pieces.areas),
         triangles=pieces.triangles[chosen],
-        reflectance=np.minimum(reflectance, 1.0).astype(np.float32),
+        reflectance=mean(pieces.reflectance),
+        translucence=mean(pieces.translucence)
+        if pieces.is_translucent.any()
+        else np.zeros((len(chosen), 3), np.float32),
         bounds=pieces.bounds[chosen],
         cells=pieces.cells[chosen],
         owners=owners,

@@ -113,9 +113,9 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, coun
 
 
 def _measured(patches: Patches, wanted):
-    """(patches, points on each, share of the work done after them) of those wanted that reflect: those of a full-size
+    """(patches, points on each, share of the work done after them) of those wanted that scatter: those of a full-size
     cell, and of small ones."""
-    wanted = wanted & (patches.reflectance.max(axis=1, initial=0.0) > 0)
+    wanted = wanted & ((patches.reflectance.max(axis=1, initial=0.0) > 0) | patches.is_translucent)
     cell_areas = np.bincount(patches.cells, patches.areas)
     is_large = cell_areas[patches.cells] > SMALL * patches.size**2
     return (np.flatnonzero(is_large & wanted), POINTS, 0.5), (np.flatnonzero(~is_large & wanted), 1, 1.0)

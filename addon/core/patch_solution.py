@@ -20,6 +20,7 @@ BRIGHT_FLUX = 0.15  # of all flux that they must send out: every receiver and ev
 CONFINED = 0.5  # a side of which fewer rays leave its reach lies in a gap
 OPENNESS_RAYS = 8
 REACH = 3.0  # patch sizes: nearer hits go on from the point hit
+ALWAYS = -1.0  # a reach: of what is translucent, which shows what arrives behind it
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,7 @@ class PatchSolution:
     reflectance : float32 (P, 3)
     kinds : uint8 (2 P,) EVEN, MIXED (lights reach one part of the side only) or LIGHT (receivers sample it as a light)
     reaches : float32 (2 P,) rays that hit from nearer do not take the side's mean [m]; inf in narrow gaps, and
-        where something parts them in two
+        where something parts them in two; ALWAYS where the mean is all that there is
     sky : float32 (n^2, 3) pi times the world's radiance, by direction [W/m^2] (sky.sky_map)
     """
 
@@ -65,6 +66,7 @@ def side_kinds(patches, radiosity, spread, is_confined):
     lit = np.flatnonzero((luminance > 0) & (patches.side_areas > 0))
     typical = _weighted_median(luminance[lit], patches.side_areas[lit]) if len(lit) else 0.0
     is_mixed = spread * patches.side_reflectance.mean(axis=1) > MIXED * (luminance + typical)
+    is_mixed &= ~np.repeat(patches.is_translucent, 2)
     is_bright = (luminance > BRIGHT * typical) & ~is_mixed & (patches.side_areas > 0)
     is_bright &= _brightest(luminance, patches.side_areas, BRIGHT_SHARE)
     is_bright &= ~is_confined
@@ -77,11 +79,13 @@ def side_kinds(patches, radiosity, spread, is_confined):
 def reaches_of(scene: Scene, kernel: KernelScene, patches: Patches, seed: int):
     """From how near a side's mean is not to be taken, float32 (2 P,) [m], and which sides are confined, bool (2 P,).
 
-    Never, in a gap narrower than its patch (confined), or where something parts it in two.
+    Never, in a gap narrower than its patch (confined), or where something parts it in two; always, of what is
+    translucent.
     """
     reaches = np.repeat(REACH * np.sqrt(patches.areas), 2).astype(np.float32)
     is_confined = kernel.openness(reaches, OPENNESS_RAYS, seed) < CONFINED
     reaches[is_confined | is_parted(scene, kernel, patches, seed)] = np.inf
+    reaches[np.repeat(patches.is_translucent, 2)] = ALWAYS
     return reaches, is_confined
 
 

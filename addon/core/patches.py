@@ -32,6 +32,7 @@ class Patches:
     areas : float64 (P,) of what rays meet: of cloth that half of them pass it is half [m^2]
     triangles : int32 (P,) which triangle each is part of, or the first of its pieces
     reflectance : float32 (P, 3) rho, the mean over the patch
+    translucence : float32 (P, 3) the same of what leaves at the other side
     bounds : float32 (P, 4) where each lies on its triangle: distance from the apex at its wide and its narrow end, and
         from the next corner to the one after at its first and its second side, all as shares
     apexes : uint8 (T,)
@@ -44,6 +45,7 @@ class Patches:
     areas: np.ndarray
     triangles: np.ndarray
     reflectance: np.ndarray
+    translucence: np.ndarray
     bounds: np.ndarray
     apexes: np.ndarray
     cells: np.ndarray
@@ -62,6 +64,19 @@ class Patches:
     def side_reflectance(self):
         """Reflectance of each unknown, float32 (2 P, 3)."""
         return np.repeat(self.reflectance, 2, axis=0)
+
+    @property
+    def is_translucent(self):
+        """Which patches are, bool (P,)."""
+        return self.translucence.any(axis=1)
+
+    def scattered(self, irradiance):
+        """Radiosity (2 P, 3) that sides send out of what arrives on them, and behind them (2 P, 3)."""
+        radiosity = self.side_reflectance * irradiance
+        through = np.flatnonzero(self.is_translucent)
+        for side in (0, 1):
+            radiosity[2 * through + side] += self.translucence[through] * irradiance[2 * through + 1 - side]
+        return radiosity
 
 
 def triangle_areas(scene: Scene):
@@ -148,6 +163,7 @@ def laid_out(kernel: KernelScene, grid: Grid, along) -> Patches:
         areas=grid.areas[triangles] * shares,
         triangles=triangles.astype(np.int32),
         reflectance=np.zeros((len(triangles), 3), np.float32),
+        translucence=np.zeros((len(triangles), 3), np.float32),
         bounds=bounds.astype(np.float32),
         apexes=grid.apexes,
         cells=cells.astype(np.int32),
@@ -212,7 +228,10 @@ def _offsets(counts):
 def with_materials(scene: Scene, kernel: KernelScene, patches: Patches, seed: int) -> Patches:
     """The patches, as the kernel has them, with what their triangles' materials come to over each."""
     reflectance = _mean_over(scene, kernel, patches, "reflectance", TEXTURE_SAMPLES, seed)
-    areas = patches.areas
+    translucence, areas = patches.translucence, patches.areas
+    if any(material.is_translucent for material in scene.materials):
+        translucence = _mean_over(scene, kernel, patches, "translucence", TEXTURE_SAMPLES, seed)
+        translucence = np.minimum(translucence, 1 - reflectance)
     if any(material.transmits for material in scene.materials):
         materials = scene.triangle_materials[patches.triangles]
         passing = _mean_over(scene, kernel, patches, "transmittance", CUT_OUT_SAMPLES, seed)
@@ -220,7 +239,7 @@ def with_materials(scene: Scene, kernel: KernelScene, patches: Patches, seed: in
         least = np.array([1 / CUT_OUT_SAMPLES if m.transmittance_texture else 0.0 for m in scene.materials])
         met = np.maximum(1 - passing.mean(axis=1, dtype=np.float64), least[materials])
         areas = np.where(np.array([m.is_glass for m in scene.materials])[materials], areas, met * areas)
-    return replace(patches, areas=areas, reflectance=reflectance)
+    return replace(patches, areas=areas, reflectance=reflectance, translucence=translucence)
 
 
 def _mean_over(scene, kernel, patches, factor, samples, seed):

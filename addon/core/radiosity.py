@@ -89,14 +89,15 @@ def _solved(
 ) -> tuple[Solved, Patches]:
     """The same without the laws, and the patches: those that a lightmap's texels mend are rough."""
     error = max(settings.error, LIGHTMAP_ERROR) if is_rough else settings.error
-    reflectance = mean_reflectance(scene)
-    solver, method, choice = choose(settings, len(scene.triangles), _side_count(scene, settings), reflectance, is_rough)
+    translucent = next((material.name for material in scene.materials if material.is_translucent), None)
+    looked_at = len(scene.triangles), _side_count(scene, settings), mean_reflectance(scene), is_rough, translucent
+    solver, method, choice = choose(settings, *looked_at)
 
     def measure(patches, on_step, known=None):
         return measure_patches(scene, kernel, patches, emitters, sky, error, settings.seed, known, on_step)
 
     def solve(lit, precision, on_step):
-        emitted = lit.patches.side_reflectance * (lit.direct + lit.daylight)
+        emitted = lit.patches.scattered(lit.direct + lit.daylight)
         found = solve_patches(kernel, lit.patches, emitted, solver, method, precision, settings.seed, on_step)
         # no surface sends less than it emits: what overshooting or an iteration left below that is its error
         return replace(found, radiosity=np.maximum(found.radiosity, emitted, out=emitted))
@@ -122,7 +123,7 @@ def _solved(
     kinds, bright = side_kinds(patches, solution.radiosity, lit.spread, is_confined)
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),
-        direct=(patches.side_reflectance * lit.direct).astype(np.float32),
+        direct=patches.scattered(lit.direct).astype(np.float32),
         reflectance=np.ascontiguousarray(patches.reflectance, np.float32),
         kinds=kinds,
         reaches=reaches,
@@ -191,7 +192,8 @@ def solve_patches(kernel, patches, emitted, solver, method, error, seed, on_step
     areas, reflectance = patches.side_areas, np.minimum(patches.side_reflectance, MOST_REFLECTANCE)
     if solver == "stochastic":
         rays = int(min(max(8 * min(len(emitted), MOST_SHOT), 1 << 18) * (0.05 / error), 1 << 25))
-        return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, seed, on_step)
+        translucence = np.minimum(patches.translucence, MOST_REFLECTANCE - reflectance[::2])
+        return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, seed, on_step, translucence)
     estimator = form_factors(kernel, method, error, seed)
     if solver == "progressive":
         return solve_progressive(estimator, reflectance, emitted, areas, UNSHOT_LIMIT, on_step)

@@ -69,6 +69,9 @@ class Material:
     transmittance : (3,) share of the light that passes straight through [0..1]; (0, 0, 0) = opaque; multiplies the
         texture where there is one
     transmittance_texture : Texture or None
+    translucence : (3,) diffuse transmittance [0..1] for the light that meets it, which leaves at the other side: no
+        more than is not reflected; multiplies the texture where there is one
+    translucence_texture : Texture or None
     """
 
     name: str
@@ -78,6 +81,8 @@ class Material:
     radiance_texture: Texture | None = None
     transmittance: tuple[float, float, float] = (0.0, 0.0, 0.0)
     transmittance_texture: Texture | None = None
+    translucence: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    translucence_texture: Texture | None = None
 
     def __post_init__(self):
         owner = f"material {self.name}"
@@ -86,6 +91,7 @@ class Material:
         if self.radiance_texture is not None:
             brightest = np.array(self.radiance, np.float64) * self.radiance_texture.pixels.max(axis=(0, 1))
             require_colour(owner, "radiance times its texture", brightest, BRIGHTEST)
+        require_colour(owner, "translucence", self.translucence, 1.0)
         require_colour(owner, "transmittance", self.transmittance, 1.0)
         if self.transmittance_texture is not None:
             most = np.array(self.transmittance, np.float64) * self.transmittance_texture.pixels.max(axis=(0, 1))
@@ -98,7 +104,22 @@ class Material:
     @property
     def is_glass(self) -> bool:
         """Whether what does not pass is lost: all rays pass it, tinted."""
-        return self.transmits and max(self.reflectance) == 0
+        return self.transmits and max(self.reflectance) == 0 and not self.is_translucent
+
+    @property
+    def is_translucent(self) -> bool:
+        return max(self.translucence) > 0
+
+    @property
+    def back_share(self) -> np.ndarray:
+        """Of the light that a side shows, how much comes by its back where both sides get the same: float64 (3,)."""
+        reflected, passed = self._mean("reflectance"), self._mean("translucence")
+        return passed / np.maximum(reflected + passed, 1e-30)
+
+    def _mean(self, factor):
+        texture = getattr(self, f"{factor}_texture")
+        of_texture = 1.0 if texture is None else texture.pixels.mean(axis=(0, 1), dtype=np.float64)
+        return np.array(getattr(self, factor), np.float64) * of_texture
 
     @property
     def emits(self) -> bool:

@@ -36,7 +36,16 @@ class _Run:
 
 
 def solve_stochastic(
-    kernel, reflectance, emitted, areas, rays, unshot_limit, seed, on_step=None, replicates: int = REPLICATES
+    kernel,
+    reflectance,
+    emitted,
+    areas,
+    rays,
+    unshot_limit,
+    seed,
+    on_step=None,
+    translucence=None,
+    replicates: int = REPLICATES,
 ) -> Solution:
     """The mean of ``replicates`` independent runs that share ``rays``, those of the first step.
 
@@ -48,6 +57,7 @@ def solve_stochastic(
     ----------
     kernel : has ``shoot``, as kernel.KernelScene
     reflectance, emitted : (N, 3) [1], [W/m^2]; areas : (N,) [m^2]
+    translucence : (N / 2, 3) of patches, or None: what arrives at one side of them leaves at the other [1]
     """
     column, reflectance = np.asarray(areas, np.float64)[:, None], np.asarray(reflectance)
     emitted_flux = column * np.asarray(emitted, np.float64)
@@ -60,7 +70,8 @@ def solve_stochastic(
             on_step(told)
 
     rays = max(rays // replicates, 1)
-    shootings = [_Shooting(kernel, reflectance, column, seed, replicate) for replicate in range(replicates)]
+    scattering = _Scattering(reflectance, translucence)
+    shootings = [_Shooting(kernel, scattering, column, seed, replicate) for replicate in range(replicates)]
     for shooting in shootings:
         runs.append(_incremental(shooting, emitted_flux, rays, unshot_limit, on_part))
         if runs[-1].is_slow:
@@ -101,20 +112,44 @@ def _mean_residuals(runs):
     return tuple(np.mean(padded, axis=0).tolist())
 
 
+class _Scattering:
+    """What sides send on of the flux that lands on them."""
+
+    def __init__(self, reflectance, translucence):
+        self._reflectance = reflectance
+        self._translucence = None if translucence is None or not translucence.any() else translucence
+        self.gain = float(reflectance.max(initial=0.0))  # the largest share that is sent on
+        if self._translucence is not None:
+            self.gain = float((reflectance[::2] + translucence).max(initial=0.0))
+
+    def sent_on(self, received, scale):
+        """Sides (L,) that get something to send on of what each received (N, 3), and that, divided by ``scale``."""
+        sending = np.flatnonzero(received[:, 0] | received[:, 1] | received[:, 2])
+        if self._translucence is not None:
+            sending = np.union1d(sending, sending[self._translucence[sending // 2].any(axis=1)] ^ 1)
+        flux = np.empty((len(sending), 3))
+        for first in range(0, len(sending), BLOCK):
+            part = sending[first : first + BLOCK]
+            flux[first : first + BLOCK] = self._reflectance[part] * (received[part] / scale)
+            if self._translucence is not None:
+                flux[first : first + BLOCK] += self._translucence[part // 2] * (received[part ^ 1] / scale)
+        return sending, flux
+
+
 class _Shooting:
     """One replicate's rays: shoots flux, keeps count of what each side's sequence has used."""
 
-    def __init__(self, kernel, reflectance, areas, seed, replicate):
+    def __init__(self, kernel, scattering, areas, seed, replicate):
         self._kernel = kernel
         self._seed = (seed + 0x9E3779B9 * replicate) & 0xFFFFFFFF  # of the first replicate the scene's own
         self._samples = np.zeros(len(areas), np.uint32)
         self._rng = np.random.default_rng([seed, 0x5AC0, replicate])
-        self.reflectance, self.areas = reflectance, areas
+        self._scattering, self.areas = scattering, areas
         self.rays = 0
 
     def shoot(self, sides, flux, rays):
-        """Shoot flux (K, 3) [W] of sides (K,) along rays: the sides where some lands (L,), what these reflect at once
-        of it (L, 3), and what leaves the scene, (3,)."""
+        """Shoot flux (K, 3) [W] of sides (K,) along rays: the sides that send some on (L,), what these send on at once
+        (L, 3), and what leaves the scene, (3,)."""
         shoots, first_rays, per_ray, scale = _allot(flux, rays, self._rng.random())
         shooting = sides[shoots]
         received, gone = self._kernel.shoot(
@@ -122,12 +157,7 @@ class _Shooting:
         )
         self._samples[shooting] += np.diff(first_rays).astype(np.uint32)
         self.rays += int(first_rays[-1])
-        landed = np.flatnonzero(received[:, 0] | received[:, 1] | received[:, 2])
-        reflected = np.empty((len(landed), 3))
-        for first in range(0, len(landed), BLOCK):
-            part = landed[first : first + BLOCK]
-            reflected[first : first + BLOCK] = self.reflectance[part] * (received[part] / scale)
-        return landed, reflected, gone / scale
+        return *self._scattering.sent_on(received, scale), gone / scale
 
     def shoot_all(self, flux, rays):
         """The same for flux of all sides (N, 3): what is reflected at once (N, 3), and what leaves the scene, (3,)."""
@@ -140,7 +170,7 @@ class _Shooting:
     def bound(self, sides, rest):
         """Of what ``rest`` (K, 3) [W] of sides may still come to, |r|_inf / (1 - max rho): a row of form factors sums
         to 1 at most."""
-        gain = float(self.reflectance.max(initial=0.0))
+        gain = self._scattering.gain
         largest = float(np.abs(rest / np.maximum(self.areas[sides], 1e-300)).max(initial=0.0))
         return largest / (1 - gain) if gain < 1 else np.inf
 

@@ -249,7 +249,8 @@ void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
  *   direct       3 * 2 * patch_count: the part of it that is the lights' direct light reflected once
  *   reflectance  3 * patch_count
  *   kinds        2 * patch_count, a pl_side_kind each
- *   reaches      2 * patch_count: a ray that hits a side from nearer than this [m] does not take its mean
+ *   reaches      2 * patch_count: a ray that hits a side from nearer than this [m] does not take its mean; below 0
+ *                every ray does, also those that hit a back first: what is translucent has nothing else
  *                but goes on from the point hit, as the patch may lie half under something; INFINITY for a
  *                side in a gap narrower than its patch, or parted by something, where no mean can stand for the light
  *   sky          3 * sky_side^2: pi * the radiance of what rays see that leave the scene, by direction: over an

@@ -128,7 +128,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         if (skips_lights && solution->kinds[side] == PL_SIDE_LIGHT)
             return;
         /* patches let a little light through walls that part them: backs, which no texel has, are not to pass it on */
-        const bool goes_on = step == 0 && is_back && job->texels;
+        const bool goes_on = step == 0 && is_back && job->texels && solution->reaches[side] >= 0;
         const bool is_mixed = solution->kinds[side] == PL_SIDE_MIXED;
         /* a mean has what bright sides give: where these are lights, what is mixed cannot be put together of both */
         const bool is_far =

@@ -60,7 +60,6 @@ def checker():
         ("BsdfTransparent", {"Color": RED}, 0, 0, RED),
         ("BsdfGlass", {"Color": RED}, 0, 0, RED),
         ("BsdfRefraction", {"Color": RED}, 0, 0, RED),
-        ("BsdfTranslucent", {"Color": RED}, 0, 0, RED),
     ],
 )
 def test_the_table(nodes, read, kind, inputs, reflectance, radiance, transmittance):
@@ -74,6 +73,19 @@ def test_the_table(nodes, read, kind, inputs, reflectance, radiance, transmittan
     ):
         # Blender stores floats: inputs are exact in binary, products of them too
         np.testing.assert_allclose(value, np.broadcast_to(expected, 4 if np.ndim(expected) else 3)[:3], atol=1e-7)
+    assert warnings == ()
+
+
+def test_a_translucent_shader_scatters_to_the_other_side(nodes, read):
+    material, tree = nodes()
+    mix = tree.new("MixShader", Fac=0.25)
+    tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
+    tree.link(tree.new("BsdfTranslucent", Color=RED), mix, 0, 2)
+    tree.show(mix)
+    found, warnings = read(material)
+    np.testing.assert_allclose(found.translucence, np.array(RED[:3]) * 0.25)
+    np.testing.assert_allclose(found.reflectance, np.array(GREY[:3]) * 0.75)
+    assert not found.transmits
     assert warnings == ()
 
 
