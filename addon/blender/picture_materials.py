@@ -9,8 +9,10 @@ from dataclasses import dataclass
 
 import bpy
 
-from .read_materials import DIFFUSE, GLOSSY, PASSING
+from .read_materials import DIFFUSE, GLOSSY, PASSING, TRANSLUCENT
 from .read_mesh import LIGHTMAP_LAYER
+
+LIT = DIFFUSE | GLOSSY | TRANSLUCENT  # shaders that the stored light is seen by, and their colours' names
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +64,8 @@ class LitMaterials:
                 self._convert(node.node_tree, light)
             elif node.type == "BSDF_PRINCIPLED":
                 _replace(tree, node, _principled(tree, node, light))
-            elif node.type in DIFFUSE or node.type in GLOSSY:
-                colour = node.inputs[DIFFUSE.get(node.type) or GLOSSY[node.type]]
+            elif node.type in LIT:
+                colour = node.inputs[LIT[node.type]]
                 _replace(tree, node, _reflected(tree, colour, light))
             elif node.type in PASSING:
                 _replace(tree, node, _transparent(tree, node.inputs["Color"]))

@@ -11,7 +11,7 @@ import numpy as np
 from ..core.scene import BRIGHTEST, Material
 from .colour_nodes import grey, read_colour_node
 from .mesh_colours import MeshColours
-from .private_render import RenderError
+from .private_render import ON_DIFFUSE_SURFACES, RenderError
 from .read_images import Images
 from .render_colours import ShaderInput, rendered_means
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, surface_shader
@@ -28,6 +28,7 @@ GLOSSY = {
     "BSDF_METALLIC": "Base Color",
     "EEVEE_SPECULAR": "Base Color",
 }
+TRANSLUCENT = {"BSDF_TRANSLUCENT": "Color"}
 PASSING = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
 COLOURS_OF_MESH = {"VERTEX_COLOR": "layer_name", "ATTRIBUTE": "attribute_name"}  # nodes, and what names the attribute
 # Their output depends on the ray: 0 is head-on, and not a camera ray, which is what bounced light mostly sees.
@@ -180,8 +181,8 @@ class MaterialReading:
             return Surface(self._colour(reached, GLOSSY[kind]))
         if kind in PASSING:
             return Surface(transmittance=self._colour(reached, "Color").within(1.0))
-        if kind == "BSDF_TRANSLUCENT":
-            return Surface(translucence=self._colour(reached, "Color").within(1.0))
+        if kind in TRANSLUCENT:
+            return Surface(translucence=self._colour(reached, TRANSLUCENT[kind]).within(1.0))
         if kind == "MIX_SHADER":
             factor = self._mix_factor(reached)
             return self._sum(((rest_of(factor), reached.feeding(1)), (factor, reached.feeding(2))))
@@ -196,7 +197,7 @@ class MaterialReading:
 
     def _principled(self, reached) -> Surface:
         base = self._colour(reached, "Base Color").within(1.0)
-        transmission = self._number(reached, "Transmission Weight")
+        transmission = float(self._amount(reached, "Transmission Weight").mean[0])
         radiance = self._emitted(reached, "Emission Color", "Emission Strength")
         if transmission >= 0.5:
             surface = Surface(radiance=radiance, transmittance=base)
@@ -213,18 +214,24 @@ class MaterialReading:
             return ALL
 
     def _emitted(self, reached, colour_name, strength_name) -> Colour:
-        strength = self._number(reached, strength_name)
-        if strength == 0:  # whatever the colour is, it need not be readable
+        strength = self._amount(reached, strength_name)
+        if strength.is_black:  # whatever the colour is, it need not be readable
             return Colour(np.zeros(3))
-        return self._colour(reached, colour_name).scaled(strength)
+        return self._colour(reached, colour_name).times(strength)
 
-    def _number(self, reached, name) -> float:
+    def _amount(self, shader, name) -> Colour:
+        """A shader's input that is a number, as a grey."""
         try:
-            return constant(reached.feeding(name))
+            return self._as_told(shader, name, self._grey)
         except Unreadable as error:
-            value = float(reached.node.inputs[name].default_value)
-            self.say(f"its {name} comes from a {error}, which cannot be read: {value:g} is used")
-            return value
+            value = float(shader.node.inputs[name].default_value)
+            self.guess(f"its {name} comes from a {error}, which cannot be read: {value:g} is used")
+            return Colour(np.full(3, value))
+
+    def _grey(self, reached) -> Colour:
+        if reached.is_constant or reached.node.type == "VALUE":
+            return Colour(np.full(3, constant(reached)))
+        return grey(self.readable_colour(reached))
 
     def _mix_factor(self, mix) -> Colour:
         try:
@@ -305,6 +312,8 @@ class MaterialReading:
     def _read_colour(self, reached) -> Colour:
         if reached.is_constant or reached.node.type in {"RGB", "VALUE"}:
             return Colour(constant_colour(reached))
+        if reached.node.type == "LIGHT_PATH" and reached.socket.name != "Is Shadow Ray":
+            return Colour(np.full(3, ON_DIFFUSE_SURFACES.get(reached.socket.name, 0.0)))
         if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
         if reached.node.type in COLOURS_OF_MESH and reached.socket.identifier == "Color":

@@ -76,6 +76,43 @@ def test_the_table(nodes, read, kind, inputs, reflectance, radiance, transmittan
     assert warnings == ()
 
 
+@pytest.mark.parametrize(("output", "radiance"), [("Is Camera Ray", 0.0), ("Is Diffuse Ray", 6.0), ("Ray Depth", 6.0)])
+def test_light_is_what_rays_from_diffuse_surfaces_see(nodes, read, output, radiance):
+    """A strength that hangs on the kind of ray, by way of a product."""
+    material, tree = nodes()
+    product = tree.new("Math")
+    product.operation = "MULTIPLY"
+    product.inputs[1].default_value = 6.0
+    tree.link(tree.new("LightPath"), product, output, 0)
+    tree.show(tree.link(product, tree.new("Emission", Color=(1, 1, 1, 1)), 0, "Strength"))
+    found, warnings = read(material)
+    np.testing.assert_allclose(found.radiance, radiance, rtol=1e-6)
+    assert warnings == ()
+
+
+def test_shadow_rays_see_what_bounced_rays_see_and_it_is_said(nodes, read):
+    material, tree = nodes("Fake")
+    mix = tree.link(tree.new("LightPath"), tree.new("MixShader"), "Is Shadow Ray", 0)
+    tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
+    tree.link(tree.new("BsdfTransparent"), mix, 0, 2)
+    tree.show(mix)
+    found, (warning,) = read(material)
+    assert found.reflectance == GREY[:3]
+    assert "'Fake'" in warning
+
+
+def test_a_strength_may_be_an_image(nodes, read, add_image):
+    material, tree = nodes()
+    image = image_node(tree, add_image(checker(), is_float=True, space="Non-Color"))
+    tree.show(tree.link(image, tree.new("Emission", Color=RED), "Color", "Strength"))
+    found, warnings = read(material)
+    luminance = checker() @ (0.2126, 0.7152, 0.0722)
+    np.testing.assert_allclose(
+        found.radiance_texture.pixels * found.radiance, luminance[..., None] * RED[:3], rtol=1e-4
+    )
+    assert warnings == ()
+
+
 def test_a_translucent_shader_scatters_to_the_other_side(nodes, read):
     material, tree = nodes()
     mix = tree.new("MixShader", Fac=0.25)

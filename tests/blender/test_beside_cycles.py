@@ -1,0 +1,183 @@
+"""A room of panels with what materials do to light in it, baked here and by Cycles: the same light on every panel."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.blender.read_scene import read_scene
+from addon.core.bake import bake
+from addon.core.settings import BakeSettings
+
+pytestmark = pytest.mark.usefixtures("empty_file")
+
+SIDE, TILE = 64, 21  # texels of the lightmap, of a panel in it
+PLACES = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1)]  # of the panels, in tiles
+SAMPLES = 64  # of Cycles for a texel; a panel has 361
+AGREED = 0.01  # four times the noise of a panel's mean by Cycles, whose samples scatter as much as the light is
+
+PANELS = [  # a corner and two sides: they look inwards
+    ((0, 0, 0), (4, 0, 0), (0, 4, 0)),
+    ((0, 0, 3), (0, 4, 0), (4, 0, 0)),
+    ((0, 0, 0), (0, 4, 0), (0, 0, 3)),
+    ((4, 0, 0), (0, 0, 3), (0, 4, 0)),
+    ((0, 4, 0), (0, 0, 3), (4, 0, 0)),
+]
+
+
+@pytest.fixture
+def room(add_mesh, nodes):
+    """Five sides of a room as one object, the sixth is open; each has a place in the lightmap."""
+    material, tree = nodes("wall")
+    tree.show(tree.new("BsdfDiffuse", Color=(0.7, 0.5, 0.3, 1)))
+    points = [tuple(np.add(c, offset)) for c, u, v in PANELS for offset in ((0, 0, 0), u, np.add(u, v), v)]
+    made = add_mesh("room", points, [tuple(range(4 * k, 4 * k + 4)) for k in range(5)], material)
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    uvs = np.array([np.add(place, corners) * TILE / SIDE for place in PLACES])
+    made.data.uv_layers.new(name="Lightmap").uv.foreach_set("vector", uvs.ravel())
+    return made
+
+
+def quad(add_mesh, name, corner, u, v, material):
+    """A single face, its UVs once over it."""
+    corner, u, v = (np.array(x, float) for x in (corner, u, v))
+    points = [tuple(corner), tuple(corner + u), tuple(corner + u + v), tuple(corner + v)]
+    made = add_mesh(name, points, [(0, 1, 2, 3)], material)
+    made.data.uv_layers.new(name="UVMap").uv.foreach_set("vector", [0, 0, 1, 0, 1, 1, 0, 1])
+    return made
+
+
+def sunlight(strength=5.0):
+    light = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
+    light.data.energy, light.data.angle, light.rotation_euler = strength, 0.02, (0.9, 0, 0.2)
+    bpy.context.scene.collection.objects.link(light)
+
+
+def lamp(location, watts=100.0):
+    light = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))
+    light.data.energy, light.data.shadow_soft_size, light.location = watts, 0.1, location
+    bpy.context.scene.collection.objects.link(light)
+
+
+def blobs():
+    """An image of ellipses: white where they are, its alpha 0 elsewhere."""
+    image = bpy.data.images.new("blobs", 64, 64, alpha=True, float_buffer=True)
+    rng, (y, x) = np.random.default_rng(0), np.mgrid[:64, :64]
+    pixels = np.zeros((64, 64, 4), np.float32)
+    for _ in range(25):
+        across, up, size = rng.uniform(0, 64), rng.uniform(0, 64), rng.uniform(3, 8)
+        pixels[(x - across) ** 2 + 4 * (y - up) ** 2 < size**2] = 1
+    image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(pixels.ravel())
+    return image
+
+
+def curtain(add_mesh, nodes):
+    """Half of the light passes it, in the sun."""
+    material, tree = nodes("cloth")
+    tree.show(tree.new("BsdfPrincipled", Base_Color=(0.8, 0.7, 0.5, 1), Alpha=0.5, Specular_IOR_Level=0.0))
+    quad(add_mesh, "curtain", (0, 0.05, 0), (4, 0, 0), (0, 0, 3), material)
+    sunlight()
+
+
+def leaves(add_mesh, nodes):
+    """Cut out by an image, in the sun."""
+    material, tree = nodes("leaf")
+    shader, image = (
+        tree.new("BsdfPrincipled", Base_Color=(0.3, 0.6, 0.2, 1), Specular_IOR_Level=0.0),
+        tree.new("TexImage"),
+    )
+    image.image = blobs()
+    tree.show(tree.link(image, shader, "Alpha", "Alpha"))
+    for k in range(4):
+        quad(add_mesh, f"leaf{k}", (0.2 + 0.9 * k, 0.4 + 0.3 * k, 0.2), (0.9, 0.3, 0), (0, 0, 2.5), material)
+    sunlight()
+
+
+def lampshade(add_mesh, nodes):
+    """Paper around a lamp, half of it translucent."""
+    material, tree = nodes("paper")
+    mix = tree.new("MixShader", Fac=0.5)
+    tree.link(tree.new("BsdfDiffuse", Color=(0.8, 0.7, 0.6, 1)), mix, 0, 1)
+    tree.link(tree.new("BsdfTranslucent", Color=(0.8, 0.7, 0.6, 1)), mix, 0, 2)
+    tree.show(mix)
+    around = [(cos(2 * pi * k / 12), sin(2 * pi * k / 12)) for k in range(12)]
+    points = [(2 + r * x, 2 + r * y, z) for x, y in around for r, z in ((0.4, 1.2), (0.3, 1.9))]
+    faces = [(2 * k, (2 * k + 2) % 24, (2 * k + 3) % 24, 2 * k + 1) for k in range(12)]
+    add_mesh("shade", points, faces, material)
+    lamp((2, 2, 1.5))
+
+
+def screen(add_mesh, nodes):
+    """A picture that glows."""
+    material, tree = nodes("screen")
+    image = tree.new("TexImage")
+    image.image = blobs()
+    tree.show(tree.link(image, tree.new("Emission", Strength=20.0), "Color", "Color"))
+    quad(add_mesh, "screen", (1, 3.9, 1), (2, 0, 0), (0, 0, 1.2), material)
+
+
+def tiles(add_mesh, nodes):
+    """A floor of a checker that no image holds."""
+    material, tree = nodes("tiles")
+    checker = tree.new("TexChecker", Color1=(0.9, 0.2, 0.1, 1), Color2=(0.05, 0.05, 0.3, 1), Scale=9.0)
+    tree.show(tree.link(checker, tree.new("BsdfDiffuse"), "Color", "Color"))
+    quad(add_mesh, "tiles", (0, 0, 0.05), (4, 0, 0), (0, 4, 0), material)
+    lamp((2, 1.5, 2))
+
+
+def painted(add_mesh, nodes):
+    """A wall of which each half has a colour of its own, in the mesh."""
+    material, tree = nodes("paint")
+    colour = tree.new("VertexColor")
+    colour.layer_name = "Paint"
+    tree.show(tree.link(colour, tree.new("BsdfDiffuse"), "Color", "Color"))
+    points = [(x, 3.9, z) for z in (0.2, 2.8) for x in (0.2, 2, 3.8)]
+    mesh = add_mesh("painted", points, [(0, 1, 4, 3), (1, 2, 5, 4)], material).data
+    values = np.repeat([(0.9, 0.1, 0.1, 1), (0.1, 0.1, 0.9, 1)], 4, axis=0)
+    mesh.color_attributes.new("Paint", "FLOAT_COLOR", "CORNER").data.foreach_set("color", values.ravel())
+    lamp((2, 1.5, 2))
+
+
+@pytest.mark.parametrize("furnish", [curtain, leaves, lampshade, screen, tiles, painted])
+def test_every_panel_has_the_light_that_cycles_gives_it(room, add_mesh, nodes, furnish):
+    furnish(add_mesh, nodes)
+    ours, cycles = our_light(room), cycles_light(room)
+    np.testing.assert_allclose(ours, cycles, rtol=AGREED, atol=AGREED * cycles.max())
+
+
+def our_light(room):
+    """Mean E / pi on each panel (5, 3)."""
+    settings = BakeSettings(keep_uvs=True, texels=SIDE**2, error=0.01)
+    scene = read_scene(bpy.context.scene, settings, [room.name])
+    return on_panels(bake(scene, settings).lightmap.pixels)
+
+
+def cycles_light(room):
+    """The same by Cycles."""
+    image = bpy.data.images.new("light", SIDE, SIDE, float_buffer=True)
+    image.colorspace_settings.name = "Non-Color"
+    tree = room.data.materials[0].node_tree
+    tree.nodes.active = tree.nodes.new("ShaderNodeTexImage")
+    tree.nodes.active.image = image
+    scene = bpy.context.scene
+    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", SAMPLES, False
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = 32
+    scene.cycles.transparent_max_bounces, scene.cycles.sample_clamp_indirect = 64, 0
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = room
+    room.select_set(True)
+    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"DIRECT", "INDIRECT"}, margin=0)
+    return on_panels(np.array(image.pixels[:], np.float32).reshape(SIDE, SIDE, 4)[..., :3])
+
+
+def on_panels(pixels):
+    """Means (5, 3) over the texels that lie in a panel's place as a whole."""
+    places = [
+        (slice(TILE * row + 1, TILE * row + TILE - 1), slice(TILE * column + 1, TILE * column + TILE - 1))
+        for column, row in PLACES
+    ]
+    return np.array([pixels[place].mean(axis=(0, 1)) for place in places])
