@@ -95,7 +95,8 @@ def _repair(pairs, wanted):
     """Scale pairs to c_i c_j pairs_ij so that row i sums to ``wanted``, about (symmetric Sinkhorn & Knopp 1967)."""
     scale = np.ones(len(pairs))
     for _ in range(REPAIRS if len(pairs) else 0):
-        sums = np.concatenate([pairs[rows].astype(np.float64, copy=False) @ scale for rows in _blocks(len(pairs))])
+        # of the rows' own precision: what that leaves goes to the side's own exchange, in float64
+        sums = (pairs @ scale.astype(pairs.dtype)).astype(np.float64)
         has_any = (sums > 0) & (wanted > 0)
         change = np.where(has_any, wanted / np.where(has_any, scale * sums, 1.0), 1.0)
         if np.abs(change - 1).max(initial=0.0) < REPAIRED:
