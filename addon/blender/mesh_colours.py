@@ -21,9 +21,9 @@ class MeshColours:
 
     attribute: str
 
-    def uvs_of(self, mesh) -> np.ndarray:
-        """UVs of a read_mesh.MeshArrays' triangles, float32 (T, 3, 2)."""
-        return palette_uvs(mesh.colours[self.attribute])
+    def uvs_of(self, mesh, chosen) -> np.ndarray:
+        """UVs of chosen triangles (K,) of read_mesh.MeshArrays, float32 (K, 3, 2)."""
+        return palette_uvs(mesh.colours[self.attribute][chosen])
 
 
 def palette() -> Texture:

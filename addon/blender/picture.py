@@ -14,11 +14,10 @@ import bpy
 import numpy as np
 
 from .picture_materials import Light, LitMaterials
-from .read_mesh import LIGHTMAP_LAYER
+from .read_mesh import BAKED_COLOURS, LIGHTMAP_LAYER
 from .rects import in_lightmap, rect_of
 from .visibility import Visibility
 from .write_lightmap import IMAGE_PROPERTY, set_lightmap_uvs
-from .write_vertex_colours import ATTRIBUTE
 
 MIDDLE_GREY = 0.20  # radiance that the median of the picture is exposed to: dark corners open, sun patches keep shape
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -113,8 +112,8 @@ def _light_of(obj, mesh):
         layer.uv.foreach_get("vector", uvs)
         set_lightmap_uvs(mesh, in_lightmap(uvs.reshape(-1, 2), rect_of(obj)))
         return Light(image=image)
-    if ATTRIBUTE in mesh.color_attributes:
-        return Light(attribute=ATTRIBUTE)
+    if BAKED_COLOURS in mesh.color_attributes:
+        return Light(attribute=BAKED_COLOURS)
     return Light()
 
 

@@ -69,25 +69,32 @@ def rendered(scene, width, height) -> np.ndarray:
 
 
 @contextmanager
-def copy_of(block, io_collection):
-    """A copy of a material or a world of ``io_collection``, and of its node groups, as rays from diffuse surfaces meet
-    it: (copy, its trees); all gone afterwards."""
-    copy, groups = block.copy(), []
+def passing_blocks():
+    """A list for data-blocks that are gone afterwards, all at once: one by one each takes longer the more there are."""
+    blocks = []
     try:
-        _adapt(copy.node_tree, groups)
-        yield copy, [copy.node_tree, *groups]
+        yield blocks
     finally:
-        io_collection.remove(copy)
-        for group in groups:
-            bpy.data.node_groups.remove(group)
+        bpy.data.batch_remove(blocks)
 
 
-def _adapt(tree, groups):
+def adapted_copy(block, io_blocks):
+    """A copy of a material or a world, and of its node groups, as rays from diffuse surfaces meet it: (copy, its
+    trees)."""
+    copy = block.copy()
+    io_blocks.append(copy)
+    trees = [copy.node_tree]
+    _adapt(copy.node_tree, trees)
+    io_blocks += trees[1:]
+    return copy, trees
+
+
+def _adapt(tree, io_trees):
     for node in list(tree.nodes):
         if node.type == "GROUP" and node.node_tree is not None:
             node.node_tree = node.node_tree.copy()
-            groups.append(node.node_tree)
-            _adapt(node.node_tree, groups)
+            io_trees.append(node.node_tree)
+            _adapt(node.node_tree, io_trees)
         elif node.type == "LIGHT_PATH" and not node.mute:
             _fix_outputs(tree, node)
 

@@ -1,4 +1,4 @@
-"""Shader nodes -> reflectance, radiance, transmittance.
+"""Shader nodes -> reflectance, radiance, transmittance, translucence.
 
 Everything reflects as a two-sided Lambertian surface: a glossy or metallic shader is read by its colour. An Emission of
 colour x strength has that radiance L (strength 3 bakes as 3.0 in Cycles, tested), so no pi enters here.
@@ -13,11 +13,11 @@ from .colour_nodes import grey, read_colour_node
 from .mesh_colours import MeshColours
 from .private_render import ON_DIFFUSE_SURFACES, RenderError
 from .read_images import Images
+from .read_mesh import BAKED_COLOURS
 from .render_colours import ShaderInput, rendered_means
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
-from .write_vertex_colours import ATTRIBUTE
 
 NO_MATERIAL = Material("no material")
 
@@ -30,6 +30,7 @@ GLOSSY = {
 }
 TRANSLUCENT = {"BSDF_TRANSLUCENT": "Color"}
 PASSING = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
+KINDS_OF_RAYS = {"Is Camera Ray", "Is Glossy Ray", "Is Singular Ray", "Is Transmission Ray", *ON_DIFFUSE_SURFACES}
 COLOURS_OF_MESH = {"VERTEX_COLOR": "layer_name", "ATTRIBUTE": "attribute_name"}  # nodes, and what names the attribute
 # Their output depends on the ray: 0 is head-on, and not a camera ray, which is what bounced light mostly sees.
 BY_VIEW = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "NEW_GEOMETRY"}
@@ -68,8 +69,10 @@ class Materials:
             told = {place: means[place] for place in reading.guessed if place in means}
             if told:
                 original = next(iter(told)).material  # what was evaluated may be gone after a render
-                reading = MaterialReading(original.evaluated_get(self._depsgraph), self._images, told)
-                self.entries[row] = reading.material()
+                second = MaterialReading(original.evaluated_get(self._depsgraph), self._images, told)
+                entry = second.material()
+                if second.coordinates() == self.coordinates[row]:  # by which triangles have their UVs
+                    reading, self.entries[row] = second, entry
             for sentence in reading.sentences():
                 self._warn(f"material '{self.entries[row].name}': {sentence}")
 
@@ -127,8 +130,11 @@ class MaterialReading:
             # a triangle has one place in textures: its image's
             self._takes_mesh_colours, self._notes, self._read, self.guessed = False, Notes(), {}, {}
             surface = self._surface()
+        surface, is_dimmed = surface.without_gain()
+        if is_dimmed:
+            self.say("its shaders send on more light than they get: they are dimmed")
         reflectance, translucence = surface.of_the_rest(surface.reflectance), surface.of_the_rest(surface.translucence)
-        if not surface.transmittance.is_black and max(reflectance.largest, translucence.largest) > 1.01:
+        if max(reflectance.largest, translucence.largest) > 1.01:
             self.say("it reflects one colour and passes another: some of what it reflects is lost")
         reflectance, translucence = reflectance.within(1.0), translucence.within(1.0)
         radiance, transmittance = surface.radiance.within(BRIGHTEST), surface.transmittance.within(1.0)
@@ -175,10 +181,10 @@ class MaterialReading:
         if kind == "EMISSION":
             return Surface(radiance=self._emitted(reached, "Color", "Strength"))
         if kind in DIFFUSE:
-            return Surface(self._colour(reached, DIFFUSE[kind]))
+            return Surface(self._colour(reached, DIFFUSE[kind]).within(1.0))
         if kind in GLOSSY:
             self.say(f"its {reached.node.bl_label} is baked as diffuse")
-            return Surface(self._colour(reached, GLOSSY[kind]))
+            return Surface(self._colour(reached, GLOSSY[kind]).within(1.0))
         if kind in PASSING:
             return Surface(transmittance=self._colour(reached, "Color").within(1.0))
         if kind in TRANSLUCENT:
@@ -272,7 +278,8 @@ class MaterialReading:
     def _as_told(self, shader, name, read) -> Colour:
         """What ``read`` makes of a shader's input; where it has to guess, with the mean that was told, if it was."""
         reached, socket = shader.feeding(name), shader.node.inputs[name]
-        place = ShaderInput(self.blender_material.original, shader.node.name, socket.identifier)
+        is_share = read == self._share
+        place = ShaderInput(self.blender_material.original, shader.node.name, socket.identifier, is_share)
         outer, self._notes = self._notes, Notes()
         try:
             found, unreadable = read(reached), None
@@ -312,7 +319,7 @@ class MaterialReading:
     def _read_colour(self, reached) -> Colour:
         if reached.is_constant or reached.node.type in {"RGB", "VALUE"}:
             return Colour(constant_colour(reached))
-        if reached.node.type == "LIGHT_PATH" and reached.socket.name != "Is Shadow Ray":
+        if reached.node.type == "LIGHT_PATH" and reached.socket.name in KINDS_OF_RAYS:
             return Colour(np.full(3, ON_DIFFUSE_SURFACES.get(reached.socket.name, 0.0)))
         if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
@@ -324,8 +331,10 @@ class MaterialReading:
         """A colour attribute's, but for those that this add-on has put there: they are light."""
         attribute = getattr(reached.node, COLOURS_OF_MESH[reached.node.type])
         is_elsewhere = getattr(reached.node, "attribute_type", "GEOMETRY") != "GEOMETRY"
-        if is_elsewhere or attribute == ATTRIBUTE or not self._takes_mesh_colours:
+        if is_elsewhere or attribute == BAKED_COLOURS or not self._takes_mesh_colours:
             raise Unreadable(f"{reached.node.bl_label} node")
+        if not attribute and reached.node.type == "ATTRIBUTE":
+            return Colour(np.zeros(3))  # as Cycles has it; a Color Attribute node takes the render colours
         self._notes.coordinates[MeshColours(attribute)] = True
         return Colour(np.ones(3), self._images.of_meshes)
 

@@ -8,7 +8,17 @@ import numpy as np
 
 LIGHTMAP_LAYER = "Lightmap"
 FLAT_DEG = 2.0  # at the most do flat-shaded faces of one plane meet at, in the mesh's own space: nothing parts them
-VALUES = {"FLOAT_COLOR": ("color", 4), "BYTE_COLOR": ("color", 4), "FLOAT_VECTOR": ("vector", 3), "FLOAT": ("value", 1)}
+VALUES = {  # attributes that a shader takes for a colour: what holds their numbers, of which type, and how many
+    "FLOAT_COLOR": ("color", np.float32, 4),
+    "BYTE_COLOR": ("color", np.float32, 4),
+    "FLOAT_VECTOR": ("vector", np.float32, 3),
+    "FLOAT2": ("vector", np.float32, 2),
+    "FLOAT": ("value", np.float32, 1),
+    "INT": ("value", np.int32, 1),
+    "INT8": ("value", np.int32, 1),
+    "BOOLEAN": ("value", bool, 1),
+}
+BAKED_COLOURS = "Patchlight"  # the attribute that holds light, and no colour
 INFINITE = 1e15  # Blender stores an infinite coordinate as the largest float
 
 
@@ -100,16 +110,22 @@ def _attribute(mesh, attribute, name, dtype, width):
 
 def _triangle_colours(mesh, name, corners, polygons):
     """An attribute's mean over each triangle as a colour, float32 (T, 3); 0 where there is none, as Cycles has it."""
-    render = mesh.color_attributes.render_color_index
-    found = mesh.attributes.get(name) if name else mesh.color_attributes[render] if render >= 0 else None
-    kind, width = VALUES.get(found.data_type, ("", 0)) if found else ("", 0)
-    if not width or found.domain not in {"POINT", "CORNER", "FACE"}:
+    found = mesh.attributes.get(name) if name else _render_colours(mesh)
+    if found is None or found.data_type not in VALUES or found.domain not in {"POINT", "CORNER", "FACE"}:
         return np.zeros((len(corners), 3), np.float32)
-    values = np.nan_to_num(_read(found.data, kind, np.float32, width).reshape(-1, width))
-    values = values[:, :3] if width > 1 else np.repeat(values, 3, axis=1)
+    kind, dtype, width = VALUES[found.data_type]
+    values = np.nan_to_num(_read(found.data, kind, dtype, width).reshape(-1, width).astype(np.float32))
+    values = np.repeat(values, 3, axis=1) if width == 1 else np.pad(values, ((0, 0), (0, max(3 - width, 0))))[:, :3]
     if found.domain == "FACE":
         return values[polygons]
     return values[corners if found.domain == "CORNER" else corner_vertices(mesh)[corners]].mean(axis=1)
+
+
+def _render_colours(mesh):
+    """The colour attribute that renders take, or another where that one holds baked light; None where there is none."""
+    render = mesh.color_attributes.render_color_index
+    chosen = [mesh.color_attributes[render]] if render >= 0 else []
+    return next((each for each in (*chosen, *mesh.color_attributes) if each.name != BAKED_COLOURS), None)
 
 
 def _flags(mesh, attribute, count):

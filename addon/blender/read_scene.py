@@ -163,6 +163,9 @@ class SceneReading:
             self.warn(self.refusals[name])
             self.new_meshes.forget(name)
             return
+        for attribute, values in arrays.colours.items():
+            if values.max(initial=0.0) > 1:
+                self.warn(f"'{name}': colours of its attribute '{attribute}' above 1 are read as 1")
         materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
         placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
         if target_mesh and self.settings.keep_uvs and placed.lightmap_uvs is not None:
@@ -186,7 +189,8 @@ class SceneReading:
         """Each triangle's UVs as its material looks them up, float32 (T, 3, 2)."""
         uvs = np.zeros((len(materials), 3, 2), np.float32)
         for row in np.unique(materials):
-            uvs[materials == row] = self.materials.coordinates[row].uvs_of(arrays)[materials == row]
+            chosen = np.flatnonzero(materials == row)
+            uvs[chosen] = self.materials.coordinates[row].uvs_of(arrays, chosen)
         return uvs
 
     def _is_wanted(self, name):

@@ -6,7 +6,6 @@ texture's space at a slant, so that what varies along one axis only varies there
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import dataclass
 from math import ceil, sqrt
 
@@ -15,20 +14,23 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.scene import BRIGHTEST
-from .private_render import copy_of, private_scene, rendered, why_not_shown
+from .private_render import adapted_copy, passing_blocks, private_scene, rendered, why_not_shown
 
 PIXELS, SAMPLES = 48, 4  # of a tile along a side, of a pixel
-OF_MESHES = {"ATTRIBUTE", "VERTEX_COLOR"}  # nodes whose colours lie in meshes, which a tile has not
+# nodes that say what lies in a mesh, or differs by object, which a tile cannot know
+OF_OBJECTS = {"ATTRIBUTE", "VERTEX_COLOR", "OBJECT_INFO", "PARTICLE_INFO", "HAIR_INFO", "POINT_INFO", "VOLUME_INFO"}
+OF_ISLANDS = "Random Per Island"  # an output of another node
 ALONG, ACROSS, UP = np.array([1, -1, 0]) / sqrt(2), np.array([1, 1, -2]) / sqrt(6), np.array([1, 1, 1]) / sqrt(3)
 
 
 @dataclass(frozen=True, slots=True)
 class ShaderInput:
-    """An input of a shader in a material's own tree, by the names that copies share."""
+    """An input of a shader in a material's own tree, by the names that copies share; ``is_share``: of [0, 1]."""
 
     material: object
     node: str
     socket: str
+    is_share: bool
 
 
 def rendered_means(inputs: list[ShaderInput], frame: int) -> list[np.ndarray | None]:
@@ -39,16 +41,15 @@ def rendered_means(inputs: list[ShaderInput], frame: int) -> list[np.ndarray | N
     RenderError : there is no Cycles, or it is at work
     """
     means = [None] * len(inputs)
-    with ExitStack() as stack:
-        scene = stack.enter_context(private_scene(frame))
+    with passing_blocks() as blocks, private_scene(frame) as scene:
         shown = {}
         for place, which in enumerate(inputs):
-            material, trees = stack.enter_context(copy_of(which.material, bpy.data.materials))
+            material, trees = adapted_copy(which.material, blocks)
             if _show(material, trees, which):
                 shown[place] = material
         side = ceil(sqrt(len(shown)))
         for tile, material in enumerate(shown.values()):
-            stack.enter_context(_Tile(scene, material, tile % side, tile // side))
+            _add_tile(scene, material, tile % side, tile // side, blocks)
         if shown:
             _look_down(scene, side)
             pixels = rendered(scene, PIXELS * side, PIXELS * side)
@@ -61,22 +62,33 @@ def rendered_means(inputs: list[ShaderInput], frame: int) -> list[np.ndarray | N
 def _show(material, trees, which) -> bool:
     """Let a material glow by what feeds an input; whether that can be shown."""
     tree = material.node_tree
-    inputs = tree.nodes[which.node].inputs
-    link = next((link for socket in inputs if socket.identifier == which.socket for link in socket.links), None)
+    (wanted,) = (socket for socket in tree.nodes[which.node].inputs if socket.identifier == which.socket)
+    link = next((link for link in wanted.links if link.is_valid and not link.is_muted), None)
     if link is None or not all(_can_be_shown(node) for node in _feeding(link.from_node)):
         return False
     for node in [node for tree in trees for node in tree.nodes]:
         if node.type == "UVMAP":
             node.uv_map = ""  # a tile has one only
     emission, output = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
-    tree.links.new(link.from_socket, emission.inputs["Color"])
+    shown = _as_number(tree, link.from_socket, which.is_share) if wanted.type == "VALUE" else link.from_socket
+    tree.links.new(shown, emission.inputs["Color"])
     tree.links.new(emission.outputs[0], output.inputs["Surface"])
-    output.is_active_output = True
+    output.target, output.is_active_output = "CYCLES", True  # before others, of all engines
     return True
 
 
+def _as_number(tree, source, is_share):
+    """What an input for a number makes of an output: a grey, a share of [0, 1] at every point."""
+    number = tree.nodes.new("ShaderNodeMath")
+    number.operation, number.use_clamp = "ADD", is_share
+    number.inputs[1].default_value = 0.0
+    tree.links.new(source, number.inputs[0])
+    return number.outputs[0]
+
+
 def _can_be_shown(node):
-    return node.type not in OF_MESHES and not why_not_shown(node)
+    differs = node.type in OF_OBJECTS or any(o.name == OF_ISLANDS and o.is_linked for o in node.outputs)
+    return not differs and not why_not_shown(node)
 
 
 def _feeding(node):
@@ -93,26 +105,18 @@ def _feeding(node):
     return found.values()
 
 
-class _Tile:
-    """A square metre of a material in a scene's grid; gone afterwards."""
-
-    def __init__(self, scene, material, column, row):
-        corners = [0.5 * (a * ALONG + b * ACROSS) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-        self._mesh = bpy.data.meshes.new("tile")
-        self._mesh.from_pydata([tuple(corner) for corner in corners], [], [(0, 1, 2, 3)])
-        self._mesh.uv_layers.new().uv.foreach_set("vector", [0, 0, 1, 0, 1, 1, 0, 1])
-        self._mesh.materials.append(material)
-        self._object = bpy.data.objects.new("tile", self._mesh)
-        turn = Matrix([ALONG, ACROSS, UP]).to_4x4()
-        self._object.matrix_world = Matrix.Translation((column + 0.5, row + 0.5, 0)) @ turn
-        scene.collection.objects.link(self._object)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        bpy.data.objects.remove(self._object)
-        bpy.data.meshes.remove(self._mesh)
+def _add_tile(scene, material, column, row, io_blocks):
+    """A square metre of a material in a scene's grid."""
+    corners = [0.5 * (a * ALONG + b * ACROSS) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    mesh = bpy.data.meshes.new("tile")
+    mesh.from_pydata([tuple(corner) for corner in corners], [], [(0, 1, 2, 3)])
+    mesh.uv_layers.new().uv.foreach_set("vector", [0, 0, 1, 0, 1, 1, 0, 1])
+    mesh.materials.append(material)
+    tile = bpy.data.objects.new("tile", mesh)
+    io_blocks += [mesh, tile]
+    turn = Matrix([ALONG, ACROSS, UP]).to_4x4()
+    tile.matrix_world = Matrix.Translation((column + 0.5, row + 0.5, 0)) @ turn
+    scene.collection.objects.link(tile)
 
 
 def _look_down(scene, side):

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from math import radians
 
-import bpy
 import numpy as np
 
-from .private_render import RenderError, copy_of, private_scene, rendered, why_not_shown
+from .private_render import RenderError, adapted_copy, passing_blocks, private_scene, rendered, why_not_shown
 
 WIDTH, HEIGHT = 1024, 512
 LEAST_SAMPLES, SAMPLES, NOISE = 8, 256, 0.02  # of a pixel: all where the sun's edge crosses it, which is .3 % of its
@@ -20,7 +19,8 @@ def rendered_world(world, frame: int) -> np.ndarray:
     """Radiance by direction as a diffuse surface sees it, float32 (HEIGHT, WIDTH, 3): pixels of an Environment."""
     if not hasattr(world, "cycles"):
         raise RenderError("Cycles is not enabled")
-    with copy_of(world, bpy.data.worlds) as (copy, trees), private_scene(frame) as scene:
+    with passing_blocks() as blocks, private_scene(frame) as scene:
+        copy, trees = adapted_copy(world, blocks)
         _adapt(copy, trees)
         _look_all_round(scene)
         scene.world = copy

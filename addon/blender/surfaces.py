@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from .read_images import mean_colour, shrunk
 
 BLACK = np.zeros(3)
 FINEST = 512  # texels a side
+GAIN = 1e-5  # over all light: rounding
 LEAST_REST = 1e-3  # of light that does not pass, from which what it is like can be told
 
 
@@ -77,6 +78,16 @@ class Surface:
     radiance: Colour = field(default_factory=lambda: Colour(BLACK))
     transmittance: Colour = field(default_factory=lambda: Colour(BLACK))
     translucence: Colour = field(default_factory=lambda: Colour(BLACK))
+
+    def without_gain(self) -> tuple[Surface, bool]:
+        """The surface, dimmed where it would send on more than it gets, as sums of shaders can; and whether it was."""
+        parts = self.reflectance, self.transmittance, self.translucence
+        total = _sum_colours(list(parts))
+        if total.largest <= 1 + GAIN:
+            return self, False
+        least = pointwise(lambda all_of_it: 1 / np.maximum(all_of_it, 1), total)
+        reflectance, transmittance, translucence = (part.times(least) for part in parts)
+        return replace(self, reflectance=reflectance, transmittance=transmittance, translucence=translucence), True
 
     def of_the_rest(self, scattered: Colour) -> Colour:
         """Of the light that does not pass straight, by its mean share (core.scene.Material): what is scattered.

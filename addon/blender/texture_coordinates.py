@@ -19,11 +19,12 @@ class Coordinates:
     uv_layer: str = ""
     affine: tuple[float, ...] = IDENTITY
 
-    def uvs_of(self, mesh) -> np.ndarray:
-        """UVs of a read_mesh.MeshArrays' triangles, float32 (T, 3, 2); 0 where it has no such layer."""
-        uvs = mesh.uvs.get(self.uv_layer or mesh.render_layer)
-        if uvs is None:
-            return np.zeros((len(mesh.triangles), 3, 2), np.float32)
+    def uvs_of(self, mesh, chosen) -> np.ndarray:
+        """UVs of chosen triangles (K,) of read_mesh.MeshArrays, float32 (K, 3, 2); 0 where it has no such layer."""
+        layer = mesh.uvs.get(self.uv_layer or mesh.render_layer)
+        if layer is None:
+            return np.zeros((len(chosen), 3, 2), np.float32)
+        uvs = layer[chosen]
         if self.affine == IDENTITY:
             return uvs
         matrix = np.array(self.affine).reshape(2, 3)

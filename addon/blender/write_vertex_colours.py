@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-ATTRIBUTE = "Patchlight"
+from .read_mesh import BAKED_COLOURS
 
 
 def write_vertex_colours(targets, corner_colours) -> None:
@@ -23,13 +23,13 @@ def write_vertex_colours(targets, corner_colours) -> None:
 
 
 def _attribute(mesh):
-    found = mesh.attributes.get(ATTRIBUTE)
+    found = mesh.attributes.get(BAKED_COLOURS)
     if found is not None and (found.domain, found.data_type) != ("CORNER", "FLOAT_COLOR"):
         mesh.attributes.remove(found)
         found = None
     if found is None:
-        mesh.color_attributes.new(ATTRIBUTE, "FLOAT_COLOR", "CORNER")
-    index = mesh.color_attributes.find(ATTRIBUTE)
+        mesh.color_attributes.new(BAKED_COLOURS, "FLOAT_COLOR", "CORNER")
+    index = mesh.color_attributes.find(BAKED_COLOURS)
     mesh.color_attributes.active_color_index = index
     mesh.color_attributes.render_color_index = index
     return mesh.color_attributes[index]

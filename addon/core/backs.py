@@ -11,8 +11,9 @@ from .kernel import KernelScene
 from .receivers import Receivers
 from .scene import Scene
 from .smoothing import TexelGrid
+from .textures import textured_colours
 from .vertex_graph import VertexGraph
-from .vertices import vertex_receivers
+from .vertices import BESIDE_CORNERS, vertex_receivers
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,23 +37,28 @@ def translucent_backs(
     scene: Scene, kernel: KernelScene, receivers: Receivers, grid: TexelGrid | VertexGraph, smooth_angle_deg: float
 ) -> Backs | None:
     """The backs of those receivers (N,) that lie on what is translucent; None where none does."""
-    shares = np.array([material.back_share for material in scene.materials]).reshape(-1, 3).astype(np.float32)
-    is_translucent = shares.any(axis=1)[scene.triangle_materials]
-    chosen = np.flatnonzero(is_translucent[receivers.triangle_sides // 2])
-    if not len(chosen):
+    is_translucent = np.array([m.is_translucent for m in scene.materials], bool)[scene.triangle_materials]
+    if not is_translucent[receivers.triangle_sides // 2].any():
         return None
     if grid.is_image:
+        chosen = np.flatnonzero(grid.translucence.any(axis=1))
         before, grid = receivers.part(chosen), grid.part(chosen)
+        reflectance, translucence = grid.reflectance, grid.translucence
     else:
         before, own_grid = vertex_receivers(_only_objects_with(scene, is_translucent), kernel, smooth_angle_deg)
         places = np.searchsorted(grid.triangles, own_grid.triangles)
         chosen, grid = (3 * places[:, None] + np.arange(3)).ravel(), own_grid
-    materials = scene.triangle_materials[before.triangle_sides // 2]
-    return Backs(chosen, shares[materials], _behind(scene, before), grid)
+        at = np.repeat(own_grid.triangles, 3), np.tile(BESIDE_CORNERS, (len(own_grid.triangles), 1))
+        reflectance, translucence = (textured_colours(scene, *at, name) for name in ("reflectance", "translucence"))
+        translucence = np.clip(translucence, 0, 1 - reflectance)
+    shares = translucence / np.maximum(reflectance + translucence, 1e-30)
+    return Backs(chosen, shares.astype(np.float32), _behind(scene, before), grid)
 
 
 def with_backs(front: Irradiance, backs: Backs, kernel, solved, error, seed, seconds_left, on_step) -> Irradiance:
-    """The irradiance of the fronts, where they are translucent mixed with that of the backs as they show it."""
+    """The irradiance of the fronts, where they are translucent mixed with that of the backs as they show it:
+    (rho E_front + tau E_back) / (rho + tau). The error that is seen stays that of the fronts.
+    """
     behind = gather_irradiance(
         kernel, solved, backs.receivers, backs.grid, None, error, seed, None, seconds_left, on_step
     )

@@ -84,11 +84,12 @@ def bake(
         solved = solve_radiosity(scene, kernel, emitters, settings, progress.step)
 
         progress.begin("gather")
+        backs = translucent_backs(scene, kernel, receivers, grid, settings.smooth_angle_deg)
+        in_front = len(receivers) / (len(receivers) + (len(backs.receivers) if backs else 0))  # of the time left
         irradiance = gather_irradiance(
             kernel, solved, receivers, grid, seen, settings.error, settings.seed, denoise,
-            seconds_left, progress.step,
+            lambda: in_front * seconds_left(), progress.step,
         )  # fmt: skip
-        backs = translucent_backs(scene, kernel, receivers, grid, settings.smooth_angle_deg)
         if backs is not None:
             how = settings.error, settings.seed, seconds_left, lambda done: progress.poll()
             irradiance = with_backs(irradiance, backs, kernel, solved, *how)
@@ -145,7 +146,7 @@ def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, l
             f"the target error {settings.error:g} was not reached: sampling stopped at an estimated "
             f"{irradiance.relative_error:.3g} {irradiance.stopped}".rstrip()
         )
-    if (solved.patches.reflectance > MOST_REFLECTANCE).any():
+    if solved.keeps_all_light:
         warnings.append(
             f"some surfaces reflect all light: it is solved for at a reflectance of {MOST_REFLECTANCE}, as it "
             "would have no bound in a closed room"

@@ -24,12 +24,12 @@ def choose(
     side_count: int,
     reflectance: float = 0.5,
     is_rough: bool = False,
-    translucent: str | None = None,
+    needs_rays: str | None = None,
 ) -> tuple[str, str, str]:
     """Solver, method, and a sentence on why, after "auto" has looked at the scene's size and mean reflectance.
 
     ``side_count`` are the sides of the patches that conjugate gradients would start with: thin triangles have many.
-    ``translucent`` names a material that lets light through diffusely, which only stochastic Jacobi solves for.
+    ``needs_rays`` names a material that lets light through in a colour, or diffusely: form factors know neither.
 
     By time to equal error, measured on closed cubes and the Cornell box of 240 to 12000 sides: rows of form factors and
     conjugate gradients take a third to a tenth of stochastic Jacobi's time at reflectance 0.9, a hundredth at 0.99, up
@@ -38,14 +38,10 @@ def choose(
     as it uses each row for one direction only.
     """
     method = "monte-carlo" if settings.method == "auto" else settings.method
-    if translucent is not None and settings.solver not in ("auto", "stochastic"):
-        raise SettingsError(
-            f"solver is {settings.solver}: material '{translucent}' is translucent, which only stochastic solves for"
-        )
+    if needs_rays is not None:
+        return _choose_rays(settings, needs_rays)
     if settings.solver != "auto":
         return settings.solver, method, f"{settings.solver} and {method} as asked"
-    if translucent is not None:
-        return "stochastic", "monte-carlo", f"stochastic, as material '{translucent}' is translucent"
     fits = triangle_count <= EXCHANGE_TRIANGLES and side_count <= EXCHANGE_LIMIT
     is_quick = side_count <= max(FEW_SIDES, SIDES / math.sqrt(max(1 - reflectance, 1e-9)))
     if method == "hemicube":
@@ -55,6 +51,17 @@ def choose(
         reason = f"{triangle_count} triangles of mean reflectance {reflectance:.2f}, where light bounces long"
         return "conjugate-gradient", method, f"conjugate-gradient for {reason}"
     return "stochastic", method, f"stochastic for {triangle_count} triangles: it needs no form factors, at any size"
+
+
+def _choose_rays(settings, material):
+    why = f"material '{material}' lets light through diffusely or in a colour"
+    for name, value, others in (
+        ("solver", settings.solver, ("auto", "stochastic")),
+        ("method", settings.method, ("auto", "monte-carlo")),
+    ):
+        if value not in others:
+            raise SettingsError(f"{name} is {value}: {why}, which only the stochastic solver can, with {others[1]}")
+    return "stochastic", "monte-carlo", f"stochastic, as {why}"
 
 
 def mean_reflectance(scene: Scene) -> float:

@@ -98,14 +98,17 @@ def _glowing_triangles(scene):
     """World corners float64 (N, 3, 3) and radiance (N, 3) of all triangles that emit."""
     emits = np.array([m.emits for m in scene.materials], bool)
     is_image = np.array([m.radiance_texture is not None for m in scene.materials], bool)
-    plain = np.flatnonzero((emits & ~is_image)[scene.triangle_materials])
-    cut = np.flatnonzero((emits & is_image)[scene.triangle_materials])
+    # at one place of its image a triangle has one colour
+    varies = is_image[scene.triangle_materials] & (scene.uvs != scene.uvs[:, :1]).any(axis=(1, 2))
+    plain = np.flatnonzero(emits[scene.triangle_materials] & ~varies)
+    cut = np.flatnonzero(emits[scene.triangle_materials] & varies)
     weights = _cuts(TEXTURE_CUTS)
 
     pieces = np.einsum("pkb,tbc->tpkc", weights, scene.corners[cut]).reshape(-1, 3, 3)
-    factors = np.array([m.radiance for m in scene.materials]).reshape(-1, 3)
+    middles = np.full((len(plain), 3), 1 / 3, np.float32)
     corners = np.concatenate([scene.corners[plain], pieces])
-    radiances = np.concatenate([factors[scene.triangle_materials[plain]], _glow_of_pieces(scene, cut, weights)])
+    of_plain = textured_colours(scene, plain, middles, "radiance")
+    radiances = np.concatenate([of_plain, _glow_of_pieces(scene, cut, weights)])
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     keep = (areas > 0) & (radiances.max(axis=1, initial=0.0) > 0) & _is_first(corners)
     return corners[keep], radiances[keep]

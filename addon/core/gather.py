@@ -144,8 +144,8 @@ def _with_texel_light(job: GatherJob, grid: TexelGrid, direct, look, seed, on_st
     is_split = split_where_blocked(job.kernel, grid.receivers, job.receivers, grid.spacing)
     # what arrives behind a translucent surface no texel has: rays take what patches show of it
     seen = grid.receivers
-    if grid.is_translucent.any():
-        seen = np.where((seen >= 0) & ~grid.is_translucent[seen], seen, -1)
+    if grid.translucence is not None:
+        seen = np.where((seen >= 0) & ~grid.translucence.any(axis=1)[seen], seen, -1)
     job = replace(job.looking_further(FAR), texel_light=texel_light(grid.uvs, seen, is_split, reach))
     job.show(grid, direct, look)
     rays, share = 0, 1 / (LOOKS - 1)

@@ -98,7 +98,7 @@ def _joined_by(kernel: KernelScene, grid: Grid, pieces: Patches, first) -> Patch
     owners = owners.astype(np.int32)
     first_pieces = np.concatenate([[0], np.cumsum(np.bincount(pieces.cells))]).astype(np.int32)
     kernel.set_patches(grid.apexes, grid.first_rows, grid.first_cells, first_pieces, owners, pieces.areas)
-    shares = np.maximum(pieces.areas, 1e-300)
+    shares = np.maximum(pieces.met, 1e-300)
     total = np.bincount(owners, shares)
 
     def mean(of_pieces):
@@ -108,6 +108,7 @@ def _joined_by(kernel: KernelScene, grid: Grid, pieces: Patches, first) -> Patch
     return replace(
         pieces,
         areas=np.bincount(owners, pieces.areas),
+        met=np.bincount(owners, pieces.met),
         triangles=pieces.triangles[chosen],
         reflectance=mean(pieces.reflectance),
         translucence=mean(pieces.translucence)

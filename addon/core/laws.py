@@ -24,7 +24,7 @@ class Laws:
     Attributes
     ----------
     closure : of the flux that a group sends, the share that neither lands nor leaves the scene: the largest of the
-        groups. 0 but for what tinted glass takes
+        groups. 0 but for what tinted glass takes, and noise of what is coloured by passing cloth
     reciprocity : sum over pairs of groups of |A_i F_ij - A_j F_ji|, relative to the sum of A_i F_ij + A_j F_ji: 0 but
         for noise, a per cent or two
     """
@@ -35,10 +35,7 @@ class Laws:
 
 def measured_laws(scene: Scene, kernel: KernelScene, patches: Patches, seed: int) -> tuple[Laws, int]:
     """The laws by rays that the groups send to each other, and how many."""
-    is_glass = np.array([material.is_glass for material in scene.materials], bool)
-    # all rays pass glass: it takes none and may send none
-    areas = np.where(np.repeat(is_glass[scene.triangle_materials[patches.triangles]], 2), 0.0, patches.side_areas)
-    groups = _groups(scene, patches)
+    areas, groups = patches.side_areas, _groups(scene, patches)
     present = np.unique(groups[areas > 0])
     exchanged, lost, rays = np.zeros((6, 6)), 0.0, 0
     for group in present:

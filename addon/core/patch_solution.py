@@ -111,6 +111,6 @@ def with_bright_sides(scene: Scene, centre, patches: Patches, emitters: Emitters
     radiances[which, bright % 2] = radiance_from_exitance(radiosity[bright])
     corners, which = patch_triangles(scene, patches, shining)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    met = patches.areas[shining] / np.maximum(0.5 * np.bincount(which, areas), 1e-300)
+    met = patches.met[shining] / np.maximum(0.5 * np.bincount(which, areas), 1e-300)
     radiances *= np.minimum(met, 1.0)[:, None, None]
     return with_sources(emitters, corners[areas > 0], radiances.reshape(-1, 6)[which[areas > 0]], centre)

@@ -18,6 +18,7 @@ from .textures import textured_colours
 
 TEXTURE_SAMPLES = 8  # points a patch on which its texture is averaged,
 CUT_OUT_SAMPLES = 32  # and what an image cuts out of it: flux is divided by what is left
+BLOCK = 1 << 16  # patches that are looked up at once
 LARGEST_SHARE = 1 / 8  # of all patches that one triangle may take
 MOST_PATCHES = 4_000_000
 
@@ -29,7 +30,8 @@ class Patches:
     Attributes
     ----------
     size : longest edge of a patch, about [m]
-    areas : float64 (P,) of what rays meet: of cloth that half of them pass it is half [m^2]
+    areas : float64 (P,) [m^2]
+    met : float64 (P,) the part of it that rays meet: of cloth that half of them pass it is half, of glass none [m^2]
     triangles : int32 (P,) which triangle each is part of, or the first of its pieces
     reflectance : float32 (P, 3) rho, the mean over the patch
     translucence : float32 (P, 3) the same of what leaves at the other side
@@ -43,6 +45,7 @@ class Patches:
 
     size: float
     areas: np.ndarray
+    met: np.ndarray
     triangles: np.ndarray
     reflectance: np.ndarray
     translucence: np.ndarray
@@ -57,8 +60,8 @@ class Patches:
 
     @property
     def side_areas(self):
-        """Area of each unknown's side, float64 (2 P,) [m^2]."""
-        return np.repeat(self.areas, 2)
+        """Area of each unknown's side that rays meet, float64 (2 P,) [m^2]."""
+        return np.repeat(self.met, 2)
 
     @property
     def side_reflectance(self):
@@ -158,9 +161,11 @@ def laid_out(kernel: KernelScene, grid: Grid, along) -> Patches:
     bounds = np.stack([1 - row / height, 1 - (row + 1) / height, column / width, (column + 1) / width], axis=1)
     # the width of a triangle falls linearly towards its apex, so area goes with the difference of squares
     shares = (bounds[:, 0] ** 2 - bounds[:, 1] ** 2) / width
+    areas = grid.areas[triangles] * shares
     return Patches(
         size=grid.size,
-        areas=grid.areas[triangles] * shares,
+        areas=areas,
+        met=areas,
         triangles=triangles.astype(np.int32),
         reflectance=np.zeros((len(triangles), 3), np.float32),
         translucence=np.zeros((len(triangles), 3), np.float32),
@@ -228,18 +233,28 @@ def _offsets(counts):
 def with_materials(scene: Scene, kernel: KernelScene, patches: Patches, seed: int) -> Patches:
     """The patches, as the kernel has them, with what their triangles' materials come to over each."""
     reflectance = _mean_over(scene, kernel, patches, "reflectance", TEXTURE_SAMPLES, seed)
-    translucence, areas = patches.translucence, patches.areas
+    translucence, met = patches.translucence, patches.areas
+    most = np.float32(1)
+    if any(material.transmits for material in scene.materials):
+        passing = _mean_over(scene, kernel, patches, "transmittance", CUT_OUT_SAMPLES, seed)
+        share = _met_share(scene, patches, passing.mean(axis=1, dtype=np.float64))
+        # what passes and what is sent on is no more than arrives, in any channel
+        most = np.minimum(1, (1 - passing) / np.maximum(share, 1e-6)[:, None]).astype(np.float32)
+        met = share * patches.areas
+    reflectance = np.minimum(reflectance, most)
     if any(material.is_translucent for material in scene.materials):
         translucence = _mean_over(scene, kernel, patches, "translucence", TEXTURE_SAMPLES, seed)
-        translucence = np.minimum(translucence, 1 - reflectance)
-    if any(material.transmits for material in scene.materials):
-        materials = scene.triangle_materials[patches.triangles]
-        passing = _mean_over(scene, kernel, patches, "transmittance", CUT_OUT_SAMPLES, seed)
-        # rays may meet what no sample has: less than a sample's share would make too much of them
-        least = np.array([1 / CUT_OUT_SAMPLES if m.transmittance_texture else 0.0 for m in scene.materials])
-        met = np.maximum(1 - passing.mean(axis=1, dtype=np.float64), least[materials])
-        areas = np.where(np.array([m.is_glass for m in scene.materials])[materials], areas, met * areas)
-    return replace(patches, areas=areas, reflectance=reflectance, translucence=translucence)
+        translucence = np.minimum(translucence, most - reflectance)
+    return replace(patches, met=met, reflectance=reflectance, translucence=translucence)
+
+
+def _met_share(scene, patches, passing):
+    """The share of rays that meet each patch (P,), of which ``passing`` (P,) of the light passes."""
+    materials = scene.triangle_materials[patches.triangles]
+    # rays may meet what no sample has: less than a sample's share would make too much of them
+    least = np.array([1 / CUT_OUT_SAMPLES if m.transmittance_texture else 0.0 for m in scene.materials])
+    is_glass = np.array([m.is_glass for m in scene.materials], bool)
+    return np.where(is_glass[materials], 0.0, np.maximum(1 - passing, least[materials]))
 
 
 def _mean_over(scene, kernel, patches, factor, samples, seed):
@@ -248,7 +263,7 @@ def _mean_over(scene, kernel, patches, factor, samples, seed):
     means = np.array([getattr(m, factor) for m in scene.materials], np.float32).reshape(-1, 3)[materials]
     is_textured = np.array([getattr(m, f"{factor}_texture") is not None for m in scene.materials], bool)[materials]
     textured = np.flatnonzero(is_textured)
-    points, barycentrics = kernel.patch_points(textured, samples, seed)
-    colours = textured_colours(scene, points, barycentrics, factor)
-    means[textured] = colours.reshape(-1, samples, 3).mean(axis=1)
+    for part in np.array_split(textured, len(textured) // BLOCK + 1):
+        points, barycentrics = kernel.patch_points(part, samples, seed)
+        means[part] = textured_colours(scene, points, barycentrics, factor).reshape(-1, samples, 3).mean(axis=1)
     return np.clip(means, 0.0, 1.0)

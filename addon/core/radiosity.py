@@ -56,6 +56,7 @@ class Solved:
     solution : the solver's own result
     laws : how far transport between the patches keeps them
     method, choice : what was picked, and why
+    keeps_all_light : whether some patch sends on more than MOST_REFLECTANCE
     rays : {"patches": ..., "solve": ..., "laws": ...}
     """
 
@@ -66,6 +67,7 @@ class Solved:
     laws: Laws
     method: str
     choice: str
+    keeps_all_light: bool
     rays: dict[str, int]
 
 
@@ -89,8 +91,8 @@ def _solved(
 ) -> tuple[Solved, Patches]:
     """The same without the laws, and the patches: those that a lightmap's texels mend are rough."""
     error = max(settings.error, LIGHTMAP_ERROR) if is_rough else settings.error
-    translucent = next((material.name for material in scene.materials if material.is_translucent), None)
-    looked_at = len(scene.triangles), _side_count(scene, settings), mean_reflectance(scene), is_rough, translucent
+    needs_rays = next((m.name for m in scene.materials if m.is_translucent or m.passes_colour), None)
+    looked_at = len(scene.triangles), _side_count(scene, settings), mean_reflectance(scene), is_rough, needs_rays
     solver, method, choice = choose(settings, *looked_at)
 
     def measure(patches, on_step, known=None):
@@ -131,7 +133,8 @@ def _solved(
     )
     sources = with_bright_sides(scene, kernel.centre, patches, emitters, solution.radiosity, bright)
     rays = {"patches": lit.rays, "solve": solution.rays}
-    return Solved(field, emitters, sources, solution, Laws(), method, choice, rays), patches
+    keeps_all_light = bool((patches.reflectance + patches.translucence > MOST_REFLECTANCE).any())
+    return Solved(field, emitters, sources, solution, Laws(), method, choice, keeps_all_light, rays), patches
 
 
 def _target_share(scene: Scene) -> float:

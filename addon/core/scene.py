@@ -96,6 +96,14 @@ class Material:
         if self.transmittance_texture is not None:
             most = np.array(self.transmittance, np.float64) * self.transmittance_texture.pixels.max(axis=(0, 1))
             require_colour(owner, "transmittance times its texture", most, 1.0)
+        if not any((self.reflectance_texture, self.transmittance_texture, self.translucence_texture)):
+            self._require_no_gain()
+
+    def _require_no_gain(self):
+        passing, scattered = np.array(self.transmittance), np.add(self.reflectance, self.translucence)
+        most = ((1 - passing.mean()) * scattered + passing).max()
+        if most > 1 + 1e-6:
+            raise SceneError(f"material {self.name} sends on {most:.4g} times the light that it gets in a channel")
 
     @property
     def transmits(self) -> bool:
@@ -107,19 +115,15 @@ class Material:
         return self.transmits and max(self.reflectance) == 0 and not self.is_translucent
 
     @property
-    def is_translucent(self) -> bool:
-        return max(self.translucence) > 0
+    def passes_colour(self) -> bool:
+        """Whether what passes straight has another colour than before."""
+        texture = self.transmittance_texture
+        is_grey = texture is None or not np.ptp(texture.pixels, axis=2).any()
+        return self.transmits and not (is_grey and np.ptp(self.transmittance) == 0)
 
     @property
-    def back_share(self) -> np.ndarray:
-        """Of the light that a side shows, how much comes by its back where both sides get the same: float64 (3,)."""
-        reflected, passed = self._mean("reflectance"), self._mean("translucence")
-        return passed / np.maximum(reflected + passed, 1e-30)
-
-    def _mean(self, factor):
-        texture = getattr(self, f"{factor}_texture")
-        of_texture = 1.0 if texture is None else texture.pixels.mean(axis=(0, 1), dtype=np.float64)
-        return np.array(getattr(self, factor), np.float64) * of_texture
+    def is_translucent(self) -> bool:
+        return max(self.translucence) > 0
 
     @property
     def emits(self) -> bool:

@@ -27,7 +27,8 @@ class BakeSettings:
     target : "lightmap" or "vertex"
     method : how form factors are estimated; "auto" is Monte Carlo
     solver : "auto" is stochastic, in bright rooms and with hemicubes conjugate-gradient while it fits, and progressive
-        with hemicubes in larger scenes; the report says which it was, and why
+        with hemicubes in larger scenes; the report says which it was, and why. Where light passes in a colour, or
+        diffusely, it is stochastic with rays, and nothing else is taken
     error : target of the local relative RMS error of the irradiance; missed, the report says so [1]
     time_limit : sampling stops after so many seconds, target reached or not [s]; None = no limit
     texels : lightmap size as a number of texels, about

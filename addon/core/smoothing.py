@@ -37,7 +37,7 @@ class TexelGrid:
     spacing : distance of neighbouring texels in space, the median [m]
     uvs : float32 (T, 3, 2) of the scene's triangles' corners, in texels; NaN without a place
     reflectance : float32 (N, 3) of the receivers
-    is_translucent : bool (N,) whether they show what arrives behind them, too
+    translucence : float32 (N, 3) of the receivers, None where it is 0 everywhere
     shown : float32 (N,) how much of the surface looks each receiver up, relative to the mean
     """
 
@@ -46,7 +46,7 @@ class TexelGrid:
     spacing: float
     uvs: np.ndarray
     reflectance: np.ndarray
-    is_translucent: np.ndarray
+    translucence: np.ndarray | None
     shown: np.ndarray
 
     @property
@@ -59,8 +59,9 @@ class TexelGrid:
         places = np.full(len(self.shown) + 1, -1, np.int32)  # of none, -1, the last
         places[chosen] = np.arange(len(chosen))
         shown = self.shown[chosen] / max(self.shown[chosen].mean(), 1e-30)
-        kept = self.reflectance[chosen], self.is_translucent[chosen], shown
-        return TexelGrid(places[self.receivers], self.spacing, self.uvs, *kept)
+        translucence = None if self.translucence is None else self.translucence[chosen]
+        cells = places[self.receivers]
+        return TexelGrid(cells, self.spacing, self.uvs, self.reflectance[chosen], translucence, shown)
 
     def stored(self, receiver_values):
         """Values per receiver (N, C) as they are stored: each texel has its own."""
@@ -107,10 +108,11 @@ def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Rec
     cells = texel_map.cells
     apart = np.concatenate([_apart(cells[row : row + BAND], receivers.positions) for row in range(0, len(cells), BAND)])
     spacing = float(np.median(apart)) if len(apart) else 1.0
-    colours = textured_colours(scene, texel_map.triangles, texel_map.barycentrics, "reflectance")
-    is_translucent = np.array([material.is_translucent for material in scene.materials], bool)
-    of_texels = is_translucent[scene.triangle_materials[texel_map.triangles]]
-    return TexelGrid(cells, spacing, charts.uvs, np.clip(colours, 0, 1), of_texels, texel_map.shown)
+    at, translucence = (texel_map.triangles, texel_map.barycentrics), None
+    reflectance = np.clip(textured_colours(scene, *at, "reflectance"), 0, 1)
+    if any(material.is_translucent for material in scene.materials):
+        translucence = np.clip(textured_colours(scene, *at, "translucence"), 0, 1 - reflectance)
+    return TexelGrid(cells, spacing, charts.uvs, reflectance, translucence, texel_map.shown)
 
 
 def _apart(rows, positions):

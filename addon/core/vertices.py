@@ -10,6 +10,7 @@ from .scene import Scene
 from .vertex_graph import VertexGraph, vertex_graph
 
 INSET = 1 / 12  # of a triangle: a vertex is where surfaces touch, so its receivers stand a little inside their faces
+BESIDE_CORNERS = np.where(np.eye(3, dtype=bool), 1 - 2 * INSET, INSET).astype(np.float32)  # barycentrics
 LIFT = 0.1  # of their distance above their faces do two receivers look for each other, and over the edge between them
 
 
@@ -22,9 +23,7 @@ def vertex_receivers(scene: Scene, kernel: KernelScene, smooth_angle_deg: float)
     """
     spans = [np.arange(o.first, o.first + o.count) for o in scene.objects if o.is_target]
     triangles = np.concatenate(spans).astype(np.int32) if spans else np.zeros(0, np.int32)
-    barycentrics = np.full((3, 3), INSET, np.float32)
-    np.fill_diagonal(barycentrics, 1 - 2 * INSET)
-    receivers = surface_receivers(scene, np.repeat(triangles, 3), np.tile(barycentrics, (len(triangles), 1)))
+    receivers = surface_receivers(scene, np.repeat(triangles, 3), np.tile(BESIDE_CORNERS, (len(triangles), 1)))
 
     corners = scene.corners[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

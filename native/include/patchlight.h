@@ -249,10 +249,10 @@ void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
  *   direct       3 * 2 * patch_count: the part of it that is the lights' direct light reflected once
  *   reflectance  3 * patch_count
  *   kinds        2 * patch_count, a pl_side_kind each
- *   reaches      2 * patch_count: a ray that hits a side from nearer than this [m] does not take its mean; below 0
- *                every ray does, also those that hit a back first: what is translucent has nothing else
+ *   reaches      2 * patch_count: a ray that hits a side from nearer than this [m] does not take its mean
  *                but goes on from the point hit, as the patch may lie half under something; INFINITY for a
- *                side in a gap narrower than its patch, or parted by something, where no mean can stand for the light
+ *                side in a gap narrower than its patch, or parted by something, where no mean can stand for the light;
+ *                below 0 where every ray takes it, also one that hits a back first: of what is translucent
  *   sky          3 * sky_side^2: pi * the radiance of what rays see that leave the scene, by direction: over an
  *                octahedron laid out flat (Engelhardt & Dachsbacher 2008), texel (column, row) at u = column + 0.5,
  *                v = row + 0.5 over the side, (2 u - 1, 2 v - 1) = (x, y) / (|x| + |y| + |z|), where z < 0 folded out:

@@ -123,3 +123,36 @@ def test_what_was_baked_into_a_mesh_is_light_and_no_colour(nodes, painted):
     found, warnings = reflected()
     assert (found == np.float32([0.5, 0.25, 0.125])).all()
     assert len(warnings) == 1
+
+
+@pytest.mark.parametrize(("kind", "values", "expected"), [("INT", [1, 0], [1, 0]), ("BOOLEAN", [True, False], [1, 0])])
+def test_a_number_of_any_type_is_a_grey(nodes, add_mesh, kind, values, expected):
+    material, tree = nodes()
+    node = tree.new("Attribute")
+    node.attribute_name = "Mask"
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), "Color", "Color"))
+    points = SQUARE + [(x + 2, y, z) for x, y, z in SQUARE]
+    mesh = add_mesh("Squares", points, [(0, 1, 2, 3), (4, 5, 6, 7)], material).data
+    mesh.attributes.new("Mask", kind, "FACE").data.foreach_set("value", values)
+    found, _ = reflected()
+    assert_close(found, np.repeat(expected, 2)[:, None] * np.ones(3))
+
+
+def test_brighter_colours_are_said_to_be_clipped(nodes, painted):
+    material, tree = nodes()
+    tree.show(tree.link(tree.new("VertexColor"), tree.new("Emission"), "Color", "Color"))
+    mesh = painted(material, np.full((8, 4), 5.0))
+    mesh.color_attributes.render_color_index = 0
+    (warning,) = read_scene(bpy.context.scene).warnings
+    assert "above 1" in warning
+
+
+def test_the_render_colours_are_never_what_was_baked(nodes, painted):
+    material, tree = nodes()
+    tree.show(tree.link(tree.new("VertexColor"), tree.new("BsdfDiffuse"), "Color", "Color"))
+    mesh = painted(material, np.repeat([(0.8, 0.2, 0.1, 1)], 8, axis=0))
+    baked = mesh.color_attributes.new("Patchlight", "FLOAT_COLOR", "CORNER")
+    baked.data.foreach_set("color", np.full(32, 0.5, np.float32))
+    mesh.color_attributes.render_color_index = 1
+    found, _ = reflected()
+    assert_close(found, np.repeat([(0.8, 0.2, 0.1)], 4, axis=0))

@@ -141,6 +141,20 @@ def test_a_mix_is_the_weighted_sum_and_an_add_the_sum(nodes, read):
     assert warnings == ()
 
 
+def test_a_sum_that_gives_more_than_it_gets_is_dimmed_and_said(nodes, read):
+    """Eight tenths of red are reflected, and as many pass: of a light of 1 there are 1, a half each."""
+    material, tree = nodes("Sum")
+    add = tree.new("AddShader")
+    tree.link(tree.new("BsdfDiffuse", Color=(0.8, 0, 0, 1)), add, 0, 0)
+    tree.link(tree.new("BsdfTransparent", Color=(0.8, 0, 0, 1)), add, 0, 1)
+    tree.show(add)
+    found, warnings = read(material)
+    np.testing.assert_allclose(found.transmittance, (0.5, 0, 0), rtol=1e-6)
+    met = 1 - np.mean(found.transmittance)
+    np.testing.assert_allclose(met * np.array(found.reflectance), (0.5, 0, 0), rtol=1e-6)
+    assert any("'Sum'" in warning and "dimmed" in warning for warning in warnings)
+
+
 def test_a_mix_of_image_and_colour_is_one_texture(nodes, read, add_image):
     material, tree = nodes()
     pixels = checker()

@@ -145,3 +145,44 @@ def test_what_the_view_decides_is_not_rendered(nodes, read, monkeypatch):
     tree.show(mix)
     (found,), _ = read(material)
     assert found.reflectance == LIGHT
+
+
+def test_a_share_is_one_at_every_point(nodes, read):
+    """Of a wave of -4 to 4 Cycles takes 0 and 1, of a half each; its mean, 0 here, would say nothing of that."""
+    material, tree = nodes()
+    scaled, mix = tree.new("Math"), tree.new("MixShader")
+    scaled.operation = "MULTIPLY_ADD"
+    scaled.inputs[1].default_value, scaled.inputs[2].default_value = 8.0, -4.0
+    tree.link(tree.new("TexChecker", Scale=20.0, Color1=(1, 1, 1, 1), Color2=(0, 0, 0, 1)), scaled, "Color", 0)
+    tree.link(scaled, mix, 0, 0)
+    tree.link(tree.new("BsdfDiffuse", Color=(*DARK, 1)), mix, 0, 1)
+    tree.link(tree.new("BsdfDiffuse", Color=(*LIGHT, 1)), mix, 0, 2)
+    tree.show(mix)
+    (found,), _ = read(material)
+    np.testing.assert_allclose(found.reflectance, (means(DARK) + LIGHT) / 2, rtol=EDGES)
+
+
+def test_a_colour_is_a_grey_where_a_number_is_asked_for(nodes, read):
+    material, tree = nodes()
+    red = tree.new("TexChecker", Scale=20.0, Color1=(1, 0, 0, 1), Color2=(1, 0, 0, 1))
+    tree.show(tree.link(red, tree.new("Emission", Color=(1, 1, 1, 1)), "Color", "Strength"))
+    (found,), _ = read(material)
+    np.testing.assert_allclose(found.radiance, 0.2126, rtol=1e-3)
+
+
+def test_the_output_of_cycles_is_the_one_that_is_shown(nodes, read):
+    material, tree = nodes()
+    output = tree.new("OutputMaterial")
+    output.target = "CYCLES"
+    tree.link(tree.link(checker(tree), tree.new("BsdfDiffuse"), "Color", "Color"), output, 0, "Surface")
+    (found,), _ = read(material)
+    np.testing.assert_allclose(found.reflectance, (means(DARK) + LIGHT) / 2, rtol=EDGES)
+
+
+def test_what_differs_by_object_is_not_told_by_a_tile(nodes, read):
+    material, tree = nodes()
+    material.diffuse_color = (*DARK, 1)
+    tree.show(tree.link(tree.new("ObjectInfo"), tree.new("BsdfDiffuse"), "Color", "Color"))
+    (found,), (warning,) = read(material)
+    assert found.reflectance == DARK
+    assert "Object Info" in warning

@@ -12,7 +12,7 @@ from addon.core.conjugate_gradient import EXCHANGE_LIMIT
 from addon.core.emitters import emitters_of
 from addon.core.radiosity import PATCH_BUDGETS, solve_radiosity
 from addon.core.scene import Material, PointLight
-from addon.core.settings import SOLVERS, BakeSettings
+from addon.core.settings import SOLVERS, BakeSettings, SettingsError
 from tests.core.meshes import box, scene_of, sphere
 from tests.scenes import LAMP, cube_room, kernel_of
 
@@ -60,6 +60,15 @@ def test_what_auto_chooses_can_be_solved(method, rings, segments, monkeypatch):
         solved = solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), settings, lambda done: None)
     assert np.isfinite(solved.solution.radiosity).all()
     assert solved.choice.startswith(solved.solution.solver)
+
+
+@pytest.mark.parametrize("settings", [BakeSettings(solver="direct"), HEMICUBE])
+def test_what_passes_in_a_colour_is_for_rays_alone(settings):
+    chosen, method, reason = choose(AUTO, 12, 2500, 0.99, needs_rays="wine")
+    assert (chosen, method) == ("stochastic", "monte-carlo")
+    assert "'wine'" in reason
+    with pytest.raises(SettingsError, match="'wine'"):
+        choose(settings, 12, 2500, 0.99, needs_rays="wine")
 
 
 def test_every_solver_has_its_number_of_patches():

@@ -127,7 +127,7 @@ def test_what_is_far_below_the_target_is_not_denoised(library):
 def four_texels():
     receivers = np.arange(4, dtype=np.int32).reshape(2, 2)
     ones = np.ones((4, 3), np.float32)
-    grid = TexelGrid(receivers, 1.0, np.zeros((0, 3, 2), np.float32), ones, np.zeros(len(ones), bool), ones[:, 0])
+    grid = TexelGrid(receivers, 1.0, np.zeros((0, 3, 2), np.float32), ones, None, ones[:, 0])
     direct = np.array([[0.0] * 3, [1.0] * 3, [0.5] * 3, [0.5] * 3], np.float32)
     gathered = np.array([[0.0] * 3, [0.0] * 3, [0.2] * 3, [0.2] * 3], np.float32)
     return grid, direct, gathered

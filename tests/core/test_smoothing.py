@@ -26,7 +26,7 @@ def wall(side=SIDE, heights=None, normals=None, rows=None):
     receivers = Receivers(SPACING * np.stack([x, y, z / SPACING], 1), facing, np.zeros(count, np.int32))
     nowhere = np.full((1, 3, 2), np.nan, np.float32)
     ones = np.ones((count, 3), np.float32)
-    return TexelGrid(grid, SPACING, nowhere, ones, np.zeros(len(ones), bool), ones[:, 0]), receivers
+    return TexelGrid(grid, SPACING, nowhere, ones, None, ones[:, 0]), receivers
 
 
 def rough_wall(seed, most_variance, holes, side=12, rows=12):

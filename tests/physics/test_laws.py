@@ -73,7 +73,7 @@ def test_wrong_areas_break_reciprocity_and_are_seen():
     """With two of six walls twice as large as they are, what they exchange with the other four is wrong by a third."""
 
     def wrong(patches):
-        return replace(patches, areas=np.where(patches.triangles < 4, 2, 1) * patches.areas)
+        return replace(patches, met=np.where(patches.triangles < 4, 2, 1) * patches.met)
 
     laws, _ = laws_of(scene_of(walls()), wrong)
     # each of six walls gives each other a fifth: of 15 pairs 8 give 2 for 1, of the rest one 2 for 2, six 1 for 1

@@ -43,7 +43,7 @@ def noise_of_arrivals(patches, choice):
     if choice.startswith("direct"):
         return 0.0  # a row sums to 1 whatever its entries are
     rays = SHOT_RAYS if choice == "stochastic" else RAYS * len(patches)
-    return 1 / np.sqrt(rays * patches.areas.min() / patches.areas.sum())
+    return 1 / np.sqrt(rays * patches.met.min() / patches.met.sum())
 
 
 def one_lit_wall(patches):

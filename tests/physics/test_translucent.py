@@ -1,12 +1,14 @@
 """What lets light through diffusely, as a lampshade does: solved for, gathered, and shown on itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from addon.core.bake import bake
 from addon.core.patches import subdivide
 from addon.core.radiosity import UNSHOT_LIMIT
-from addon.core.scene import Material
+from addon.core.scene import Material, Texture
 from addon.core.settings import BakeSettings, SettingsError
 from addon.core.stochastic import solve_stochastic
 from tests.physics.lighting import floor_receivers, full_light
@@ -98,5 +100,27 @@ def test_the_sheet_shows_what_arrives_behind_it(target):
 
 def test_a_solver_that_does_not_know_it_is_refused():
     settings = BakeSettings(target="vertex", solver="direct")
-    with pytest.raises(SettingsError, match="'sheet' is translucent"):
+    with pytest.raises(SettingsError, match="'sheet' lets light through"):
         bake(two_rooms(), settings)
+
+
+@pytest.mark.parametrize("target", ["lightmap", "vertex"])
+def test_an_image_says_where_the_sheet_is_translucent(target):
+    """One half is opaque and black above: from a dark room it shows nothing, the other half what arrives below."""
+    pixels = np.zeros((64, 64, 3), np.float32)
+    pixels[:, 32:] = 1
+    scene = two_rooms()
+    sheet = replace(scene.materials[2], translucence_texture=Texture("half", pixels))
+    uvs = scene.uvs.copy()
+    uvs[scene.objects[2].span] = scene.corners[scene.objects[2].span][..., :2]
+    scene = replace(scene, uvs=uvs, materials=(*scene.materials[:2], sheet))
+    result = bake(scene, BakeSettings(target=target, texels=4096, error=0.05))
+    span = scene.objects[2].span
+    if target == "vertex":
+        x, light = scene.corners[span][..., 0], result.corner_colours[span][..., 1]
+    else:
+        pixels, middles = result.lightmap.pixels, result.lightmap.uvs[span].mean(axis=1)
+        columns, rows = (middles * pixels.shape[1::-1]).astype(int).T
+        x, light = scene.corners[span][..., 0].mean(axis=1), pixels[rows, columns, 1]
+    assert light[x < 0.45].max() < 1e-3
+    assert light[x > 0.55].min() > 0.1
