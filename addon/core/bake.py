@@ -85,7 +85,7 @@ def bake(
 
         progress.begin("gather")
         backs = translucent_backs(scene, kernel, receivers, grid, settings.smooth_angle_deg)
-        in_front = len(receivers) / (len(receivers) + (len(backs.receivers) if backs else 0))  # of the time left
+        in_front = 1 if backs is None else len(receivers) / (len(receivers) + len(backs.receivers))  # of the time left
         irradiance = gather_irradiance(
             kernel, solved, receivers, grid, seen, settings.error, settings.seed, denoise,
             lambda: in_front * seconds_left(), progress.step,

@@ -60,7 +60,7 @@ def _choose_rays(settings, material):
         ("method", settings.method, ("auto", "monte-carlo")),
     ):
         if value not in others:
-            raise SettingsError(f"{name} is {value}: {why}, which only the stochastic solver can, with {others[1]}")
+            raise SettingsError(f"{name} is {value}: {why}, which takes {others[1]} (or auto)")
     return "stochastic", "monte-carlo", f"stochastic, as {why}"
 
 
