@@ -109,14 +109,22 @@ def environments(draw):
 
 @st.composite
 def materials(draw):
-    """Transmittance and glow are rare, so that most scenes have surfaces to light."""
-    clear = draw(st.sampled_from(((0.0, 0.0, 0.0),) * 4 + ((1.0, 1.0, 1.0), (0.5, 0.0, 0.0))))
+    """Transmittance, translucence and glow are rare, so that most scenes have surfaces to light."""
+    clear = draw(st.sampled_from(((0.0, 0.0, 0.0),) * 4 + ((1.0, 1.0, 1.0), (0.5, 0.0, 0.0), (0.3, 0.3, 0.3))))
+    through = draw(st.sampled_from(((0.0, 0.0, 0.0),) * 5 + ((0.2, 0.3, 0.0),)))
     glow = draw(st.just((0.0, 0.0, 0.0)) | brightness)
     image = st.none() | st.none() | textures()
     tint, shown = draw(image), draw(image)
     if shown and max(glow) * shown.pixels.max() > 1e15:  # refused, as test_scene.py shows
         shown = None
-    return Material("stuff", draw(colour), tint, glow, shown, clear)
+    cut_out, mask = draw(image), draw(image)
+    if cut_out and cut_out.pixels.max() > 1:  # refused, too, as is what gives more than it gets
+        cut_out = None
+    reflected = np.array(draw(colour))
+    most = (1 - np.array(clear)) / max(1 - np.mean(clear), 1e-9)
+    dimmed = np.minimum(1, most / np.maximum(reflected + through, 1e-9)).min()
+    reflected, through = (tuple(float(x) for x in dimmed * np.array(part)) for part in (reflected, through))
+    return Material("stuff", reflected, tint, glow, shown, clear, cut_out, through, mask)
 
 
 @st.composite
