@@ -42,6 +42,8 @@ def translucent_backs(
         return None
     if grid.is_image:
         chosen = np.flatnonzero(grid.translucence.any(axis=1))
+        if not len(chosen):
+            return None
         before, grid = receivers.part(chosen), grid.part(chosen)
         reflectance, translucence = grid.reflectance, grid.translucence
     else:
@@ -50,6 +52,7 @@ def translucent_backs(
         chosen, grid = (3 * places[:, None] + np.arange(3)).ravel(), own_grid
         at = np.repeat(own_grid.triangles, 3), np.tile(BESIDE_CORNERS, (len(own_grid.triangles), 1))
         reflectance, translucence = (textured_colours(scene, *at, name) for name in ("reflectance", "translucence"))
+        reflectance = np.clip(reflectance, 0, 1)
         translucence = np.clip(translucence, 0, 1 - reflectance)
     shares = translucence / np.maximum(reflectance + translucence, 1e-30)
     return Backs(chosen, shares.astype(np.float32), _behind(scene, before), grid)
