@@ -11,8 +11,8 @@ import numpy as np
 
 from ..core.scene import Texture
 
-LEVELS = 32  # of a channel, evenly in the square root of its light: 3 % apart where it is bright
-WIDTH, HEIGHT = 256, LEVELS**3 // 256
+LEVELS = 64  # of a channel, evenly in the square root of its light: 3 % apart where it is bright
+WIDTH, HEIGHT = 512, LEVELS**3 // 512  # as large as nodes leave an image
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,8 +16,8 @@ pytestmark = pytest.mark.usefixtures("empty_file")
 
 SIDE, TILE = 64, 21  # texels of the lightmap, of a panel in it
 PLACES = [(0, 0), (1, 0), (2, 0), (0, 1), (1, 1)]  # of the panels, in tiles
-SAMPLES = 64  # of Cycles for a texel; a panel has 361
-AGREED = 0.01  # four times the noise of a panel's mean by Cycles, whose samples scatter as much as the light is
+SAMPLES = 256  # of Cycles for a texel; a panel has 361
+AGREED = 0.01  # some four times the noise of a mean by Cycles, of which paths that find a lamp late are the most
 
 PANELS = [  # a corner and two sides: they look inwards
     ((0, 0, 0), (4, 0, 0), (0, 4, 0)),
@@ -123,7 +123,7 @@ def screen(add_mesh, nodes):
 def tiles(add_mesh, nodes):
     """A floor of a checker that no image holds."""
     material, tree = nodes("tiles")
-    checker = tree.new("TexChecker", Color1=(0.9, 0.2, 0.1, 1), Color2=(0.05, 0.05, 0.3, 1), Scale=9.0)
+    checker = tree.new("TexChecker", Color1=(0.9, 0.2, 0.1, 1), Color2=(0.05, 0.05, 0.3, 1), Scale=20.0)
     tree.show(tree.link(checker, tree.new("BsdfDiffuse"), "Color", "Color"))
     quad(add_mesh, "tiles", (0, 0, 0.05), (4, 0, 0), (0, 4, 0), material)
     lamp((2, 1.5, 2))
