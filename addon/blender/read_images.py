@@ -20,7 +20,6 @@ class Images:
     def __init__(self, warn):
         self._textures = {}
         self._warn = warn
-        self.of_meshes = palette()  # of all that have colours
 
     def texture(self, image) -> Texture:
         """The image as linear Rec.709 pixels; Unreadable where it has none."""
@@ -29,6 +28,12 @@ class Images:
     def alpha(self, image) -> Texture:
         """The image's alpha as a grey."""
         return self._read_once(image, "alpha", lambda: alpha_pixels(image, self._warn))
+
+    def of_meshes(self) -> Texture:
+        """What stands for the colours of all meshes that have some."""
+        if "meshes" not in self._textures:
+            self._textures["meshes"] = palette()
+        return self._textures["meshes"]
 
     def _read_once(self, image, what, read):
         key = image.original.as_pointer(), what

@@ -43,7 +43,7 @@ class Materials:
         self.entries = [NO_MATERIAL]
         self.coordinates = [Coordinates()]
         self._indices = {}
-        self._readings = [None]
+        self._guessed, self._sentences = [()], [()]  # of each entry; what was read of its images is not to stay
         self._depsgraph = depsgraph
         self._warn = warn
         self._images = Images(warn)
@@ -58,23 +58,27 @@ class Materials:
             self._indices[key] = len(self.entries)
             self.entries.append(reading.material())
             self.coordinates.append(reading.coordinates())
-            self._readings.append(reading)
+            self._guessed.append(tuple(reading.guessed))
+            self._sentences.append(reading.sentences())
         return self._indices[key]
 
     def finish(self) -> None:
         """Have Cycles tell what could not be read, in one render for all, and say what is noteworthy."""
-        inputs = [place for reading in self._readings[1:] for place in reading.guessed]
+        inputs = [place for guessed in self._guessed for place in guessed]
         means = self._rendered(inputs) if inputs else {}
-        for row, reading in enumerate(self._readings[1:], 1):
-            told = {place: means[place] for place in reading.guessed if place in means}
+        for row, guessed in enumerate(self._guessed):
+            told = {place: means[place] for place in guessed if place in means}
             if told:
-                original = next(iter(told)).material  # what was evaluated may be gone after a render
-                second = MaterialReading(original.evaluated_get(self._depsgraph), self._images, told)
-                entry = second.material()
-                if second.coordinates() == self.coordinates[row]:  # by which triangles have their UVs
-                    reading, self.entries[row] = second, entry
-            for sentence in reading.sentences():
+                self._read_again(row, told)
+            for sentence in self._sentences[row]:
                 self._warn(f"material '{self.entries[row].name}': {sentence}")
+
+    def _read_again(self, row, told):
+        original = next(iter(told)).material  # what was evaluated may be gone after a render
+        reading = MaterialReading(original.evaluated_get(self._depsgraph), self._images, told)
+        entry = reading.material()
+        if reading.coordinates() == self.coordinates[row]:  # by which triangles have their UVs
+            self.entries[row], self._sentences[row] = entry, reading.sentences()
 
     def _rendered(self, inputs):
         try:
@@ -214,7 +218,7 @@ class MaterialReading:
 
     def _alpha(self, reached) -> Colour:
         try:
-            return self._as_told(reached, "Alpha", self._share)
+            return self._as_told(reached, "Alpha", self._share, is_share=True)
         except Unreadable as error:
             self.guess(f"its alpha comes from a {error}, which cannot be read: it is baked opaque")
             return ALL
@@ -241,7 +245,7 @@ class MaterialReading:
 
     def _mix_factor(self, mix) -> Colour:
         try:
-            return self._as_told(mix, 0, self._share)
+            return self._as_told(mix, 0, self._share, is_share=True)
         except Unreadable as error:
             if mix.feeding(0).node.type in BY_VIEW:
                 self.say(f"its shaders are mixed by a {error}: the first one is used")
@@ -275,10 +279,9 @@ class MaterialReading:
             self.guess(f"its {error} cannot be read: the viewport colour is used")
             return self._viewport_colour()
 
-    def _as_told(self, shader, name, read) -> Colour:
+    def _as_told(self, shader, name, read, is_share=False) -> Colour:
         """What ``read`` makes of a shader's input; where it has to guess, with the mean that was told, if it was."""
         reached, socket = shader.feeding(name), shader.node.inputs[name]
-        is_share = read == self._share
         place = ShaderInput(self.blender_material.original, shader.node.name, socket.identifier, is_share)
         outer, self._notes = self._notes, Notes()
         try:
@@ -336,7 +339,7 @@ class MaterialReading:
         if not attribute and reached.node.type == "ATTRIBUTE":
             return Colour(np.zeros(3))  # as Cycles has it; a Color Attribute node takes the render colours
         self._notes.coordinates[MeshColours(attribute)] = True
-        return Colour(np.ones(3), self._images.of_meshes)
+        return Colour(np.ones(3), self._images.of_meshes())
 
     def _image_colour(self, reached) -> Colour:
         if reached.node.image is None:

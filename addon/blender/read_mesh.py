@@ -39,6 +39,7 @@ class MeshArrays:
     uvs : dict, name of a UV layer -> float32 (T, 3, 2)
     render_layer : str, the UV layer that textures use; "" where there is none
     colours : dict, name of an attribute ("" = the render colours) -> float32 (T, 3), the mean; 0 where there is none
+    unread_colours : names of those that are there, but cannot be read: 0, too
     """
 
     positions: np.ndarray
@@ -52,6 +53,7 @@ class MeshArrays:
     uvs: dict
     render_layer: str
     colours: dict
+    unread_colours: tuple
 
 
 def read_mesh(mesh, uv_layers=(), colours=()) -> MeshArrays:
@@ -79,6 +81,7 @@ def read_mesh(mesh, uv_layers=(), colours=()) -> MeshArrays:
         uvs={layer.name: _layer_uvs(layer)[corners] for layer in mesh.uv_layers if layer.name in wanted},
         render_layer=render_layer,
         colours={name: _triangle_colours(mesh, name, corners, polygons) for name in colours},
+        unread_colours=tuple(name for name in colours if not _is_readable(mesh, name)),
     )
 
 
@@ -110,8 +113,8 @@ def _attribute(mesh, attribute, name, dtype, width):
 
 def _triangle_colours(mesh, name, corners, polygons):
     """An attribute's mean over each triangle as a colour, float32 (T, 3); 0 where there is none, as Cycles has it."""
-    found = mesh.attributes.get(name) if name else _render_colours(mesh)
-    if found is None or found.data_type not in VALUES or found.domain not in {"POINT", "CORNER", "FACE"}:
+    found = _colour_attribute(mesh, name)
+    if found is None or not _is_readable(mesh, name):
         return np.zeros((len(corners), 3), np.float32)
     kind, dtype, width = VALUES[found.data_type]
     values = np.nan_to_num(_read(found.data, kind, dtype, width).reshape(-1, width).astype(np.float32))
@@ -121,11 +124,21 @@ def _triangle_colours(mesh, name, corners, polygons):
     return values[corners if found.domain == "CORNER" else corner_vertices(mesh)[corners]].mean(axis=1)
 
 
-def _render_colours(mesh):
-    """The colour attribute that renders take, or another where that one holds baked light; None where there is none."""
+def _colour_attribute(mesh, name):
+    """The attribute of a name, "" = that which renders take, or another where that one holds baked light; or None."""
+    if name:
+        return mesh.attributes.get(name)
     render = mesh.color_attributes.render_color_index
     chosen = [mesh.color_attributes[render]] if render >= 0 else []
     return next((each for each in (*chosen, *mesh.color_attributes) if each.name != BAKED_COLOURS), None)
+
+
+def _is_readable(mesh, name):
+    """Whether an attribute is a colour, or not there, which is black; not what has baked light in its place only."""
+    found = _colour_attribute(mesh, name)
+    if found is None:
+        return bool(name) or not len(mesh.color_attributes)
+    return found.data_type in VALUES and found.domain in {"POINT", "CORNER", "FACE"}
 
 
 def _flags(mesh, attribute, count):

@@ -166,6 +166,8 @@ class SceneReading:
         for attribute, values in arrays.colours.items():
             if values.max(initial=0.0) > 1:
                 self.warn(f"'{name}': colours of its attribute '{attribute}' above 1 are read as 1")
+        for attribute in arrays.unread_colours:
+            self.warn(f"'{name}': its attribute '{attribute or 'of render colours'}' cannot be read: it is black")
         materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
         placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
         if target_mesh and self.settings.keep_uvs and placed.lightmap_uvs is not None:

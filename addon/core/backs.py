@@ -11,7 +11,7 @@ from .kernel import KernelScene
 from .receivers import Receivers
 from .scene import Scene
 from .smoothing import TexelGrid
-from .textures import textured_colours
+from .textures import scattered_shares
 from .vertex_graph import VertexGraph
 from .vertices import BESIDE_CORNERS, vertex_receivers
 
@@ -38,22 +38,18 @@ def translucent_backs(
 ) -> Backs | None:
     """The backs of those receivers (N,) that lie on what is translucent; None where none does."""
     is_translucent = np.array([m.is_translucent for m in scene.materials], bool)[scene.triangle_materials]
-    if not is_translucent[receivers.triangle_sides // 2].any():
+    if not is_translucent[receivers.triangle_sides // 2].any() or (grid.is_image and grid.translucence is None):
         return None
     if grid.is_image:
         chosen = np.flatnonzero(grid.translucence.any(axis=1))
-        if not len(chosen):
-            return None
         before, grid = receivers.part(chosen), grid.part(chosen)
         reflectance, translucence = grid.reflectance, grid.translucence
     else:
         before, own_grid = vertex_receivers(_only_objects_with(scene, is_translucent), kernel, smooth_angle_deg)
         places = np.searchsorted(grid.triangles, own_grid.triangles)
         chosen, grid = (3 * places[:, None] + np.arange(3)).ravel(), own_grid
-        at = np.repeat(own_grid.triangles, 3), np.tile(BESIDE_CORNERS, (len(own_grid.triangles), 1))
-        reflectance, translucence = (textured_colours(scene, *at, name) for name in ("reflectance", "translucence"))
-        reflectance = np.clip(reflectance, 0, 1)
-        translucence = np.clip(translucence, 0, 1 - reflectance)
+        beside = np.tile(BESIDE_CORNERS, (len(own_grid.triangles), 1))
+        reflectance, translucence = scattered_shares(scene, np.repeat(own_grid.triangles, 3), beside)
     shares = translucence / np.maximum(reflectance + translucence, 1e-30)
     return Backs(chosen, shares.astype(np.float32), _behind(scene, before), grid)
 

@@ -98,10 +98,10 @@ def _glowing_triangles(scene):
     """World corners float64 (N, 3, 3) and radiance (N, 3) of all triangles that emit."""
     emits = np.array([m.emits for m in scene.materials], bool)
     is_image = np.array([m.radiance_texture is not None for m in scene.materials], bool)
+    cut = np.flatnonzero((emits & is_image)[scene.triangle_materials])
     # at one place of its image a triangle has one colour
-    varies = is_image[scene.triangle_materials] & (scene.uvs != scene.uvs[:, :1]).any(axis=(1, 2))
-    plain = np.flatnonzero(emits[scene.triangle_materials] & ~varies)
-    cut = np.flatnonzero(emits[scene.triangle_materials] & varies)
+    cut = cut[(scene.uvs[cut] != scene.uvs[cut, :1]).any(axis=(1, 2))]
+    plain = np.setdiff1d(np.flatnonzero(emits[scene.triangle_materials]), cut, assume_unique=True)
     weights = _cuts(TEXTURE_CUTS)
 
     pieces = np.einsum("pkb,tbc->tpkc", weights, scene.corners[cut]).reshape(-1, 3, 3)

@@ -93,7 +93,9 @@ def gather_irradiance(
     pace = (rays["direct"] + rays["gather"] + learning) / (time.perf_counter() - started)
     passes = within(on_step, 0.4, 0.6)
     gathered = gather_until(job, grid, direct, denoise, error, seed, pace, seconds_left, passes)
-    seen_error, rays["probe"] = _seen_error(job, seen, gathered.values, error, seed + 5) if seen else (0.0, 0)
+    seen_error, rays["probe"] = (
+        _seen_error(job, seen, gathered.values, error, seed + 5) if seen is not None else (0.0, 0)
+    )
     rays["gather"] += learning + gathered.rays
     rays["probe"] += gathered.probe_rays
     is_met = gathered.rms <= error

@@ -70,7 +70,7 @@ def _direct_on_patches(scene, kernel, patches: Patches, wanted, emitters, sample
     """The lights' mean irradiance on every side, float64 (2 P, 3), its spread over the side (2 P,), and shadow rays.
 
     A full-size patch is measured at several points; a small one at one, as its neighbours stand in for it when light is
-    gathered. What reflects nothing is left dark.
+    gathered. What scatters nothing is left dark.
     """
     irradiance, spread = np.zeros((len(patches), 2, 3)), np.zeros((len(patches), 2))
     rays = 0

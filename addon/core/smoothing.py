@@ -18,7 +18,7 @@ from .kernel import clamp_outliers, smooth
 from .receivers import Receivers
 from .scene import Scene
 from .texels import TexelMap
-from .textures import textured_colours
+from .textures import scattered_shares
 from .workers import Workers
 
 STEPS = (1, 2, 4, 8)  # texels between the taps of successive levels
@@ -108,10 +108,9 @@ def texel_grid(scene: Scene, charts: Charts, texel_map: TexelMap, receivers: Rec
     cells = texel_map.cells
     apart = np.concatenate([_apart(cells[row : row + BAND], receivers.positions) for row in range(0, len(cells), BAND)])
     spacing = float(np.median(apart)) if len(apart) else 1.0
-    at, translucence = (texel_map.triangles, texel_map.barycentrics), None
-    reflectance = np.clip(textured_colours(scene, *at, "reflectance"), 0, 1)
-    if any(material.is_translucent for material in scene.materials):
-        translucence = np.clip(textured_colours(scene, *at, "translucence"), 0, 1 - reflectance)
+    reflectance, translucence = scattered_shares(scene, texel_map.triangles, texel_map.barycentrics)
+    if translucence is not None and not translucence.any():
+        translucence = None
     return TexelGrid(cells, spacing, charts.uvs, reflectance, translucence, texel_map.shown)
 
 

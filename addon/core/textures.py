@@ -23,6 +23,16 @@ def lookup(texture: Texture, uvs):
     return (low * (1 - up) + high * up).astype(np.float32)
 
 
+def scattered_shares(scene: Scene, triangles, barycentrics):
+    """Reflectance and translucence, no more than 1 together, at points of triangles: float32 (N, 3) each; the second is
+    None where nothing is translucent."""
+    reflectance = np.clip(textured_colours(scene, triangles, barycentrics, "reflectance"), 0, 1)
+    if not any(material.is_translucent for material in scene.materials):
+        return reflectance, None
+    translucence = textured_colours(scene, triangles, barycentrics, "translucence")
+    return reflectance, np.clip(translucence, 0, 1 - reflectance)
+
+
 def textured_colours(scene: Scene, triangles, barycentrics, factor: str):
     """A material's ``factor``, as Material names it, times its texture, at points of triangles: float32 (N, 3)."""
     factors = np.array([getattr(m, factor) for m in scene.materials], np.float32).reshape(-1, 3)

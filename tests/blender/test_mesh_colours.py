@@ -156,3 +156,13 @@ def test_the_render_colours_are_never_what_was_baked(nodes, painted):
     mesh.color_attributes.render_color_index = 1
     found, _ = reflected()
     assert_close(found, np.repeat([(0.8, 0.2, 0.1)], 4, axis=0))
+
+
+def test_what_has_baked_light_only_is_said_to_be_black(nodes, painted):
+    material, tree = nodes()
+    tree.show(tree.link(tree.new("VertexColor"), tree.new("BsdfDiffuse"), "Color", "Color"))
+    mesh = painted(material, np.ones((8, 4)), "Patchlight")
+    mesh.color_attributes.render_color_index = 0
+    found, (warning,) = reflected()
+    assert (found == 0).all()
+    assert "'Squares'" in warning

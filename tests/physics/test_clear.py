@@ -94,8 +94,8 @@ def test_a_pane_that_all_light_passes_is_not_there(solver):
         with kernel_of(scene, 2) as kernel:
             emitters = emitters_of(scene, kernel.centre)
             solved = solve_radiosity(scene, kernel, emitters, settings, lambda done: None)
-        walls = solved.solution.radiosity[: 2 * 200]
-        light.append(walls.mean())
+        shining = solved.solution.radiosity[:, 1] > 0  # neither pane does
+        light.append(solved.solution.radiosity[shining].mean())
     # the same rays in another order of sides, of a solver's error of 0.02 in each of some hundred patches
     assert light[0] == pytest.approx(light[1], rel=0.01)
 
