@@ -87,7 +87,7 @@ class NewMeshes:
             mesh[key] = blender_object.data[key]
         modifiers = [m for m in blender_object.modifiers if m.show_viewport and not _stays_on(m)]
         self.modifiers[name] = tuple(modifier.name for modifier in modifiers)
-        parts = [*map(_described, modifiers), *(["shape keys"] if blender_object.data.shape_keys else [])]
+        parts = [*self.modifiers[name], *(["shape keys"] if blender_object.data.shape_keys else [])]
         self._say(name, f"has had {' and '.join(parts) or 'what makes its faces'} applied by the bake")
         content = (blender_object.data.name, _content(mesh)) if self._shares else None
         if content not in self._applied:
@@ -130,14 +130,6 @@ def _remove_unused(name):
 
 def _stays_on(modifier):
     return modifier.type in STAY_ON and getattr(modifier, "fluid_type", "") != "DOMAIN"
-
-
-def _described(modifier):
-    """The modifier's name, and its level where a render would show another one than the viewport, which is applied."""
-    levels = [getattr(modifier, name, None) for name in ("levels", "render_levels")]
-    if levels[0] == levels[1]:
-        return modifier.name
-    return f"{modifier.name} (as the viewport has it, at level {levels[0]} of {levels[1]})"
 
 
 def _content(mesh):

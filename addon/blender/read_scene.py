@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.scene import Scene, SceneError, SceneObject
 from ..core.settings import BakeSettings
+from .as_rendered import as_rendered
 from .mesh_colours import MeshColours
 from .new_meshes import NewMeshes
 from .place_mesh import PlacedMesh, place_mesh, unit_normals
@@ -58,11 +59,11 @@ def read_scene(
     SceneError : a named object is unknown or cannot be baked, or nothing can be
     """
     view_layer = _view_layer(bpy_scene)
-    view_layer.update()
     wanted = None if object_names is None else set(object_names)
-    reading = SceneReading(view_layer, settings, wanted, new_meshes or NewMeshes())
-    reading.read_objects()
-    return reading.scene(bpy_scene.world)
+    with as_rendered(bpy_scene, view_layer):
+        reading = SceneReading(view_layer, settings, wanted, new_meshes or NewMeshes())
+        reading.read_objects()
+        return reading.scene(bpy_scene.world)
 
 
 def _view_layer(bpy_scene):
@@ -106,8 +107,6 @@ class SceneReading:
                 self._read_instance(instance, f"{name}#{number}" if instance.is_instance else name, shared)
         self._spare_other_lightmaps(shared)
         self._require_targets()
-        for name in self.visibility.viewport_hidden_names():
-            self.warn(f"'{name}' is hidden in the viewport: the bake does not see it")
 
     def scene(self, world) -> Scene:
         """All that was read, as one core Scene."""

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-RENDERED_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "VOLUME", "CURVES", "LIGHT"}
-
 
 class Visibility:
-    """Render visibility in one view layer; the depsgraph itself only knows the viewport's."""
+    """Render visibility in one view layer, of which the depsgraph has more."""
 
     def __init__(self, view_layer):
         self._view_layer = view_layer
@@ -28,17 +26,6 @@ class Visibility:
     def hidden_names(self) -> set[str]:
         """Objects of the view layer that no render shows."""
         return {o.name for o in self._view_layer.objects if o.hide_render or o.name not in self._rendered}
-
-    def viewport_hidden_names(self) -> list[str]:
-        """Objects that a render shows but the viewport, and so the depsgraph, does not."""
-        return [
-            o.name
-            for o in self._view_layer.objects
-            if o.type in RENDERED_TYPES
-            and o.name in self._rendered
-            and not o.hide_render
-            and not o.visible_get(view_layer=self._view_layer)
-        ]
 
     def _collect(self, layer_collection):
         if layer_collection.exclude or layer_collection.collection.hide_render:

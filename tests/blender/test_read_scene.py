@@ -162,14 +162,6 @@ def test_hidden_objects_are_not_read(add_cube):
             read(object_names=[name])
 
 
-def test_an_object_hidden_in_the_viewport_only_is_named(add_cube):
-    add_cube("Seen")
-    add_cube("Forgotten").hide_viewport = True
-    scene = read()
-    assert [o.name for o in scene.objects] == ["Seen"]
-    assert any("'Forgotten' is hidden in the viewport" in warning for warning in scene.warnings)
-
-
 def test_instances_light_the_scene_under_their_numbers(add_cube):
     add_cube("Room")
     source = bpy.data.collections.new("Furniture")

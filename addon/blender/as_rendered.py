@@ -1,0 +1,95 @@
+"""A depsgraph as a render has it: Blender's Python is given the viewport's only, so the viewport is set to show what a
+render would, and set back."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import bpy
+
+# what of each kind of modifier the viewport has another number of than a render: (viewport's, render's)
+LEVELS = {
+    "SUBSURF": ("levels", "render_levels"),
+    "MULTIRES": ("levels", "render_levels"),
+    "SCREW": ("steps", "render_steps"),
+    "OCEAN": ("viewport_resolution", "resolution"),
+}
+SIMPLIFIED = {
+    "simplify_subdivision": "simplify_subdivision_render",
+    "simplify_child_particles": "simplify_child_particles_render",
+}
+
+
+@contextmanager
+def as_rendered(bpy_scene, view_layer):
+    """While it lasts, the view layer's depsgraph has what a render shows: hidden objects, render levels of modifiers.
+
+    Objects that no render shows may still be there. Afterwards all is as it was.
+    """
+    before = []
+    hidden = [o for o in view_layer.objects if not o.hide_render and o.hide_get(view_layer=view_layer)]
+    try:
+        for owner, name, value in _differences(bpy_scene, view_layer):
+            before.append((owner, name, getattr(owner, name)))
+            setattr(owner, name, value)
+        _hide(hidden, False, view_layer)
+        view_layer.update()
+        yield
+    finally:
+        for owner, name, value in reversed(before):
+            setattr(owner, name, value)
+        _hide(hidden, True, view_layer)
+        if before or hidden:
+            view_layer.update()
+
+
+def _hide(objects, is_hidden, view_layer):
+    for blender_object in objects:
+        blender_object.hide_set(is_hidden, view_layer=view_layer)
+
+
+def _differences(bpy_scene, view_layer):
+    """(owner, attribute, value) of all that the viewport has otherwise than a render."""
+    wanted = [*_simplified(bpy_scene.render), *_of_collections(view_layer)]
+    for blender_object in bpy.data.objects:
+        if not blender_object.hide_render:
+            wanted.append((blender_object, "hide_viewport", False))
+        for modifier in blender_object.modifiers:
+            wanted += _of_modifier(modifier)
+    for curve in bpy.data.curves:
+        wanted += [
+            (curve, f"resolution_{axis}", getattr(curve, f"render_resolution_{axis}"))
+            for axis in "uv"
+            if getattr(curve, f"render_resolution_{axis}") > 0  # 0: as the viewport
+        ]
+    wanted += [(ball, "resolution", ball.render_resolution) for ball in bpy.data.metaballs]
+    for particles in bpy.data.particles:
+        wanted += [(particles, "display_percentage", 100), (particles, "display_method", "RENDER")]
+        wanted.append((particles, "child_percent", particles.rendered_child_count))
+    return [(owner, name, value) for owner, name, value in wanted if getattr(owner, name) != value]
+
+
+def _simplified(render):
+    if not render.use_simplify:
+        return []
+    return [(render, viewport, getattr(render, rendered)) for viewport, rendered in SIMPLIFIED.items()]
+
+
+def _of_collections(view_layer):
+    """The viewport's switches of a collection and of its place in the layer; a render knows only one."""
+    own = [(collection, "hide_viewport", collection.hide_render) for collection in bpy.data.collections]
+    return own + [(layer, "hide_viewport", False) for layer in _below(view_layer.layer_collection)]
+
+
+def _below(layer_collection):
+    for child in layer_collection.children:
+        if not child.exclude:
+            yield child
+            yield from _below(child)
+
+
+def _of_modifier(modifier):
+    yield modifier, "show_viewport", modifier.show_render
+    if modifier.type in LEVELS:
+        viewport, rendered = LEVELS[modifier.type]
+        yield modifier, viewport, getattr(modifier, rendered)
