@@ -124,7 +124,9 @@ def materials(draw):
     most = (1 - np.array(clear)) / max(1 - np.mean(clear), 1e-9)
     dimmed = np.minimum(1, most / np.maximum(reflected + through, 1e-9)).min()
     reflected, through = (tuple(float(x) for x in dimmed * np.array(part)) for part in (reflected, through))
-    return Material("stuff", reflected, tint, glow, shown, clear, cut_out, through, mask)
+    made = Material("stuff", reflected, tint, glow, shown, clear, cut_out, through, mask)
+    seen_by = draw(st.sampled_from(((True, True),) * 5 + ((True, False), (False, True), (False, False))))
+    return made if all(seen_by) else made.seen_by(*seen_by)
 
 
 @st.composite
@@ -148,7 +150,13 @@ def sun_lights(draw):
     return SunLight("sun", towards, draw(brightness), draw(st.sampled_from((0.0, 0.01, 1.0, np.pi))))
 
 
-lights = st.lists(point_lights() | area_lights() | sun_lights(), max_size=3)
+@st.composite
+def lights_with_or_without_shadows(draw):
+    light = draw(point_lights() | area_lights() | sun_lights())
+    return light if draw(st.sampled_from((True, True, False))) else replace(light, casts_shadow=False)
+
+
+lights = st.lists(lights_with_or_without_shadows(), max_size=3)
 texture_uvs = st.sampled_from((0.0, 0.3, -7.5, 1e30, np.nan, np.inf))
 atlas_uvs = st.sampled_from((0.0, 0.2, 0.5, 1.0)) | st.floats(0, 1, width=32)
 bad_uvs = st.sampled_from((np.nan, np.inf, -0.1, 1.1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos, pi, sin
 
 import numpy as np
@@ -9,9 +10,11 @@ import numpy as np
 from ..core.scene import AreaLight, PointLight, SunLight
 from .colour_nodes import blackbody
 from .shader_nodes import Unreadable, constant, constant_colour, surface_shader
+from .visibility import seen_by, warn_of_linking
 
 # A hard-edged cone is a very narrow soft one: the smoothstep over it stays finite.
 NARROWEST_CONE_EDGE = 1e-6
+ENOUGH_BOUNCES = 12  # Cycles' own limit for a scene, as Blender sets it
 
 
 def read_lights(depsgraph, visibility, warn) -> tuple:
@@ -21,15 +24,39 @@ def read_lights(depsgraph, visibility, warn) -> tuple:
         if instance.object.type != "LIGHT" or not visibility.shows(instance):
             continue
         lamp, name = instance.object.data, instance.object.name
+        if not seen_by(instance)[1] or _is_portal(lamp):
+            continue  # Cycles' diffuse surfaces do not see it
         power = _power(lamp, name, warn)
         if max(power) <= 0:
             continue
+        warn_of_linking(instance.object, warn)
+        _warn_of_bounces(lamp, name, warn)
         matrix = np.array(instance.matrix_world, np.float64)
         if not np.isfinite(matrix).all():
             warn(f"light '{name}' has a transform that is not finite: it is left out")
             continue
-        lights += READERS[lamp.type](lamp, name, matrix, power, warn)
+        read = READERS[lamp.type](lamp, name, matrix, power, warn)
+        lights += [replace(light, casts_shadow=_casts_shadow(lamp)) for light in read]
     return tuple(lights)
+
+
+def _of_cycles(lamp, name, otherwise):
+    """A setting of Cycles' own, if that is there and has it."""
+    return getattr(getattr(lamp, "cycles", None), name, otherwise)
+
+
+def _is_portal(lamp):
+    return lamp.type == "AREA" and _of_cycles(lamp, "is_portal", False)
+
+
+def _casts_shadow(lamp):
+    return _of_cycles(lamp, "cast_shadow", lamp.use_shadow)  # Blender's own does it for Cycles, too, since 4.3
+
+
+def _warn_of_bounces(lamp, name, warn):
+    most = _of_cycles(lamp, "max_bounces", ENOUGH_BOUNCES)
+    if most < ENOUGH_BOUNCES:
+        warn(f"light '{name}': its limit of {most} bounces is not read")
 
 
 def _power(lamp, name, warn):

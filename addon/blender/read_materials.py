@@ -18,8 +18,10 @@ from .render_colours import ShaderInput, rendered_means
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
+from .view_nodes import mean_over_view
 
 NO_MATERIAL = Material("no material")
+EVERY_RAY = (True, True)  # shadow rays, and light that bounces
 
 DIFFUSE = {"BSDF_DIFFUSE": "Color", "SUBSURFACE_SCATTERING": "Color", "BSDF_TOON": "Color", "BSDF_SHEEN": "Color"}
 GLOSSY = {
@@ -32,8 +34,9 @@ TRANSLUCENT = {"BSDF_TRANSLUCENT": "Color"}
 PASSING = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
 KINDS_OF_RAYS = {"Is Camera Ray", "Is Glossy Ray", "Is Singular Ray", "Is Transmission Ray", *ON_DIFFUSE_SURFACES}
 COLOURS_OF_MESH = {"VERTEX_COLOR": "layer_name", "ATTRIBUTE": "attribute_name"}  # nodes, and what names the attribute
-# Their output depends on the ray: 0 is head-on, and not a camera ray, which is what bounced light mostly sees.
-BY_VIEW = {"FRESNEL", "LAYER_WEIGHT", "LIGHT_PATH", "NEW_GEOMETRY"}
+SEEN_BY_ANGLE = {"FRESNEL", "LAYER_WEIGHT"}
+# Their output depends on the ray: where they cannot be read, 0 is a front, and no kind of ray that a bake has.
+BY_VIEW = {*SEEN_BY_ANGLE, "LIGHT_PATH", "NEW_GEOMETRY"}
 
 
 class Materials:
@@ -42,25 +45,38 @@ class Materials:
     def __init__(self, depsgraph, warn):
         self.entries = [NO_MATERIAL]
         self.coordinates = [Coordinates()]
-        self._indices = {}
+        self._indices, self._on_unseen = {}, {}
         self._guessed, self._sentences = [()], [()]  # of each entry; what was read of its images is not to stay
         self._depsgraph = depsgraph
         self._warn = warn
         self._images = Images(warn)
 
-    def index_of(self, material) -> int:
-        """Row of a Blender material (or None) in ``entries``."""
+    def index_of(self, material, is_seen_by=EVERY_RAY) -> int:
+        """Row of a Blender material (or None) in ``entries``, on objects that shadow rays and light meet, or one of
+        them."""
+        row = self._own_row(material)
+        if is_seen_by == EVERY_RAY:
+            return row
+        if (row, is_seen_by) not in self._on_unseen:
+            self._on_unseen[row, is_seen_by] = self._add(self.entries[row], self.coordinates[row])
+        return self._on_unseen[row, is_seen_by]
+
+    def _own_row(self, material):
         if material is None:
             return 0
         key = material.original.as_pointer()
         if key not in self._indices:
             reading = MaterialReading(material.evaluated_get(self._depsgraph), self._images)
-            self._indices[key] = len(self.entries)
-            self.entries.append(reading.material())
-            self.coordinates.append(reading.coordinates())
-            self._guessed.append(tuple(reading.guessed))
-            self._sentences.append(reading.sentences())
+            entry, coordinates = reading.material(), reading.coordinates()
+            self._indices[key] = self._add(entry, coordinates, tuple(reading.guessed), reading.sentences())
         return self._indices[key]
+
+    def _add(self, entry, coordinates, guessed=(), sentences=()):
+        for rows, value in zip(
+            (self.entries, self.coordinates, self._guessed, self._sentences), (entry, coordinates, guessed, sentences)
+        ):
+            rows.append(value)
+        return len(self.entries) - 1
 
     def finish(self) -> None:
         """Have Cycles tell what could not be read, in one render for all, and say what is noteworthy."""
@@ -72,6 +88,8 @@ class Materials:
                 self._read_again(row, told)
             for sentence in self._sentences[row]:
                 self._warn(f"material '{self.entries[row].name}': {sentence}")
+        for (row, is_seen_by), on_unseen in self._on_unseen.items():
+            self.entries[on_unseen] = self.entries[row].seen_by(*is_seen_by)
 
     def _read_again(self, row, told):
         original = next(iter(told)).material  # what was evaluated may be gone after a render
@@ -326,6 +344,10 @@ class MaterialReading:
             return Colour(np.full(3, ON_DIFFUSE_SURFACES.get(reached.socket.name, 0.0)))
         if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
+        if reached.node.type in SEEN_BY_ANGLE:
+            mean = mean_over_view(reached)
+            self.say(f"its {reached.node.bl_label} node is taken at its mean over directions, {mean:.2g}")
+            return Colour(np.full(3, mean))
         if reached.node.type in COLOURS_OF_MESH and reached.socket.identifier == "Color":
             return self._mesh_colour(reached)
         return read_colour_node(reached, self)

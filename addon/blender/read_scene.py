@@ -25,7 +25,7 @@ from .rects import in_lightmap, rect_of
 from .shared_meshes import SharedMeshes, why_not_without
 from .targets import has_faces_of, why_not_modified, why_not_target
 from .texture_coordinates import Coordinates
-from .visibility import Visibility
+from .visibility import Visibility, seen_by, warn_of_linking
 
 DEFAULTS = BakeSettings()
 
@@ -148,12 +148,13 @@ class SceneReading:
             if not len(mesh.polygons):
                 return
             target_mesh, new = self._target_mesh(instance, mesh, matrix, shared)
-            self._append(name, target_mesh, evaluated, new or mesh, matrix)
+            self._append(name, target_mesh, instance, new or mesh, matrix)
         finally:
             evaluated.to_mesh_clear()
 
-    def _append(self, name, target_mesh, evaluated, mesh, matrix):
-        rows = self._slot_materials(evaluated, mesh)
+    def _append(self, name, target_mesh, instance, mesh, matrix):
+        evaluated = instance.object
+        rows = self._slot_materials(evaluated, mesh, seen_by(instance))
         coordinates = [self.materials.coordinates[row] for row in rows]
         colours = {each.attribute for each in coordinates if isinstance(each, MeshColours)}
         arrays = read_mesh(mesh, {each.uv_layer for each in coordinates if isinstance(each, Coordinates)}, colours)
@@ -162,6 +163,7 @@ class SceneReading:
             self.warn(self.refusals[name])
             self.new_meshes.forget(name)
             return
+        warn_of_linking(evaluated, self.warn)
         for attribute, values in arrays.colours.items():
             if values.max(initial=0.0) > 1:
                 self.warn(f"'{name}': colours of its attribute '{attribute}' above 1 are read as 1")
@@ -176,7 +178,7 @@ class SceneReading:
         self.names.append(name)
         self.target_meshes.append(target_mesh)
 
-    def _slot_materials(self, evaluated, mesh):
+    def _slot_materials(self, evaluated, mesh, is_seen_by):
         """Rows of ``materials`` by material slot, int32 (slots or 1,)."""
         materials = list(mesh.materials)
         for index, slot in enumerate(evaluated.material_slots):
@@ -184,7 +186,8 @@ class SceneReading:
                 materials.append(slot.material)
             elif slot.link == "OBJECT":
                 materials[index] = slot.material
-        return np.array([self.materials.index_of(material) for material in materials or [None]], np.int32)
+        rows = [self.materials.index_of(material, is_seen_by) for material in materials or [None]]
+        return np.array(rows, np.int32)
 
     def _texture_uvs(self, arrays: MeshArrays, materials):
         """Each triangle's UVs as its material looks them up, float32 (T, 3, 2)."""

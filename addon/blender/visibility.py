@@ -1,4 +1,4 @@
-"""What a render would show: render visibility of objects, collections and instancers."""
+"""What a render would show: render visibility of objects, collections and instancers, and to which rays."""
 
 from __future__ import annotations
 
@@ -33,3 +33,16 @@ class Visibility:
         self._rendered.update(o.name for o in layer_collection.collection.objects)
         for child in layer_collection.children:
             self._collect(child)
+
+
+def seen_by(instance) -> tuple[bool, bool]:
+    """Whether shadow rays and light that bounces meet an entry of ``depsgraph.object_instances``, as Cycles has it."""
+    shown = [instance.object, *([instance.parent] if instance.is_instance else [])]
+    return all(each.visible_shadow for each in shown), all(each.visible_diffuse for each in shown)
+
+
+def warn_of_linking(blender_object, warn) -> None:
+    """Say that an object is to light, or to hide light from, a collection only."""
+    linking = getattr(blender_object, "light_linking", None)  # none before Blender 4.0
+    if linking and (linking.receiver_collection or linking.blocker_collection):
+        warn(f"'{blender_object.name}': its light linking is not read: it lights all, and all hide it")

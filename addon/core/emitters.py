@@ -45,9 +45,11 @@ class Emitters:
 def emitters_of(scene: Scene, centre) -> Emitters:
     """The scene's lights and glowing triangles; ``centre`` is what the kernel re-centred by [m]."""
     table = [_light_row(light, np.asarray(centre)) for light in scene.lights]
+    parameters = _padded([row for _, row in table])
+    parameters[:, -1] = [not light.casts_shadow for light in scene.lights]
     lamps = Emitters(
         kinds=np.array([kind for kind, _ in table], np.int32),
-        parameters=_padded([row for _, row in table]),
+        parameters=parameters,
         corners=np.zeros((0, 9), np.float32),
         radiances=np.zeros((0, 6), np.float32),
         cumulative=np.zeros(0, np.float32),

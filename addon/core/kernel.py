@@ -21,6 +21,7 @@ except ImportError as error:  # a source tree that has not been built, or a zip 
 
 ROWS = 16  # of a lightmap are smoothed at once, where neighbours are a texel apart
 NO_OWNERS = np.zeros(0, np.int32)  # of pieces: each is a patch
+RAYS_STOP, RAYS_MISS, SHADOWS_MISS = 1, 2, 4  # pl_clear_rays
 GUIDE_CELLS = 64  # PL_GUIDE_CELLS of native/include/patchlight.h
 
 LIBRARY_PATTERNS = {
@@ -203,7 +204,7 @@ class KernelScene:
 
 def _clear(scene: Scene):
     """What passes straight through the scene's triangles, as the kernel takes it; None where all are opaque."""
-    if not any(material.transmits for material in scene.materials):
+    if all(material.is_opaque for material in scene.materials):
         return None
     textures = [material.transmittance_texture for material in scene.materials]
     images = {id(texture): texture.pixels for texture in textures if texture is not None}
@@ -213,11 +214,20 @@ def _clear(scene: Scene):
     ends = np.cumsum(shapes.prod(axis=1))
     return (
         np.array([m.transmittance for m in scene.materials], np.float32)[scene.triangle_materials],
-        np.array([not m.is_glass for m in scene.materials], np.uint8)[scene.triangle_materials],
+        np.array([_clear_rays(m) for m in scene.materials], np.uint8)[scene.triangle_materials],
         maps[scene.triangle_materials],
         scene.uvs.reshape(-1, 6),
         np.column_stack([ends - shapes.prod(axis=1), shapes]).astype(np.int32),
         np.concatenate([np.zeros((0, 3), np.float32), *(pixels.reshape(-1, 3) for pixels in images.values())]),
+    )
+
+
+def _clear_rays(material):
+    """A sum of pl_clear_rays."""
+    return (
+        RAYS_STOP * material.stops_light
+        + RAYS_MISS * (not material.meets_light)
+        + (SHADOWS_MISS * (not material.meets_shadow_rays))
     )
 
 

@@ -235,7 +235,7 @@ def with_materials(scene: Scene, kernel: KernelScene, patches: Patches, seed: in
     reflectance = _mean_over(scene, kernel, patches, "reflectance", TEXTURE_SAMPLES, seed)
     translucence, met = patches.translucence, patches.areas
     most = np.float32(1)
-    if any(material.transmits for material in scene.materials):
+    if any(material.transmits or not material.meets_light for material in scene.materials):
         passing = _mean_over(scene, kernel, patches, "transmittance", CUT_OUT_SAMPLES, seed)
         share = _met_share(scene, patches, passing.mean(axis=1, dtype=np.float64))
         # what passes and what is sent on is no more than arrives, in any channel
@@ -253,8 +253,8 @@ def _met_share(scene, patches, passing):
     materials = scene.triangle_materials[patches.triangles]
     # rays may meet what no sample has: less than a sample's share would make too much of them
     least = np.array([1 / CUT_OUT_SAMPLES if m.transmittance_texture else 0.0 for m in scene.materials])
-    is_glass = np.array([m.is_glass for m in scene.materials], bool)
-    return np.where(is_glass[materials], 0.0, np.maximum(1 - passing, least[materials]))
+    is_met = np.array([m.stops_light for m in scene.materials], bool)
+    return np.where(is_met[materials], np.maximum(1 - passing, least[materials]), 0.0)
 
 
 def _mean_over(scene, kernel, patches, factor, samples, seed):

@@ -122,7 +122,10 @@ def _solved(
 
     patches = lit.patches
     reaches, is_confined = reaches_of(scene, kernel, patches, settings.seed)
-    kinds, bright = side_kinds(patches, solution.radiosity, lit.spread, is_confined)
+    # those that are sampled as lights are seen by shadow rays
+    kinds, bright = side_kinds(
+        patches, solution.radiosity, lit.spread, is_confined if scene.hides_as_it_shows else np.ones_like(is_confined)
+    )
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),
         direct=patches.scattered(lit.direct).astype(np.float32),

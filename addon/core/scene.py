@@ -5,7 +5,7 @@ Built by ``addon.blender.read_scene`` from a .blend, or by hand in tests. After 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -72,6 +72,9 @@ class Material:
     translucence : (3,) diffuse transmittance [0..1] for the light that meets it, which leaves at the other side: no
         more than is not reflected; multiplies the texture where there is one
     translucence_texture : Texture or None
+    meets_shadow_rays : whether it hides lights; False = they shine through it
+    meets_light : whether light that bounces meets it; False = it passes, and nobody sees the surface, which must not
+        emit nor scatter light
     """
 
     name: str
@@ -83,6 +86,8 @@ class Material:
     transmittance_texture: Texture | None = None
     translucence: tuple[float, float, float] = (0.0, 0.0, 0.0)
     translucence_texture: Texture | None = None
+    meets_shadow_rays: bool = True
+    meets_light: bool = True
 
     def __post_init__(self):
         owner = f"material {self.name}"
@@ -96,6 +101,8 @@ class Material:
         if self.transmittance_texture is not None:
             most = np.array(self.transmittance, np.float64) * self.transmittance_texture.pixels.max(axis=(0, 1))
             require_colour(owner, "transmittance times its texture", most, 1.0)
+        if not self.meets_light and max(*self.reflectance, *self.radiance, *self.translucence) > 0:
+            raise SceneError(f"{owner} sends on light, which nobody sees")
         if not any((self.reflectance_texture, self.transmittance_texture, self.translucence_texture)):
             self._require_no_gain()
 
@@ -109,10 +116,21 @@ class Material:
     def transmits(self) -> bool:
         return max(self.transmittance) > 0
 
+    def seen_by(self, shadow_rays: bool, light: bool) -> Material:
+        """The material on a surface that hides lights or not, and that light that bounces meets or not."""
+        nothing = {} if light else dict.fromkeys(("reflectance", "radiance", "translucence"), (0.0, 0.0, 0.0))
+        return replace(self, meets_shadow_rays=shadow_rays, meets_light=light, **nothing)
+
     @property
-    def is_glass(self) -> bool:
-        """Whether what does not pass is lost: all rays pass it, tinted."""
-        return self.transmits and max(self.reflectance) == 0 and not self.is_translucent
+    def is_opaque(self) -> bool:
+        """Whether all rays meet it, and none passes."""
+        return not self.transmits and self.meets_shadow_rays and self.meets_light
+
+    @property
+    def stops_light(self) -> bool:
+        """Whether light that bounces meets some of it; what glass does not pass is lost: all rays pass it, tinted."""
+        is_glass = self.transmits and max(self.reflectance) == 0 and not self.is_translucent
+        return self.meets_light and not is_glass
 
     @property
     def passes_colour(self) -> bool:
@@ -146,6 +164,7 @@ class PointLight:
     soft_falloff: bool = False
     direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
     cone_cosines: tuple[float, float] = (-2.0, -2.0)
+    casts_shadow: bool = True  # False = it shines through everything
 
     def __post_init__(self):
         owner = f"light {self.name}"
@@ -171,6 +190,7 @@ class AreaLight:
     radiance: tuple[float, float, float]  # L [W/(m^2 sr)]
     is_ellipse: bool = False
     spread: float = 3.141592653589793  # full angle [rad]
+    casts_shadow: bool = True
 
     def __post_init__(self):
         owner = f"light {self.name}"
@@ -188,6 +208,7 @@ class SunLight:
     direction: tuple[float, float, float]  # where the light travels to, unit
     irradiance: tuple[float, float, float]  # [W/m^2]
     angle: float = 0.0  # [rad]
+    casts_shadow: bool = True
 
     def __post_init__(self):
         owner = f"light {self.name}"
@@ -294,6 +315,11 @@ class Scene:
             expected += obj.count
         if expected != triangle_count:
             raise SceneError(f"objects cover {expected} of {triangle_count} triangles")
+
+    @property
+    def hides_as_it_shows(self) -> bool:
+        """Whether shadow rays and light that bounces meet the same surfaces."""
+        return all(material.meets_shadow_rays == material.meets_light for material in self.materials)
 
     @property
     def corners(self) -> np.ndarray:

@@ -126,7 +126,7 @@ static const risen_triangle *choose_risen(const aimed_light *aimed, float *io_x)
 static void aim_at(const aimed_light *aimed, const risen_triangle *risen, vec3 target, pl_light_sample *out) {
     target = vec3_mul_add(risen->normal, rounding_of(target), target);
     out->direction = vec3_sub(target, aimed->point);
-    out->far = far_of_face;
+    out->far = light_is_shadowless(aimed->lights, aimed->light) ? 0 : far_of_face;
 }
 
 static bool sample_by_area(const aimed_light *aimed, float x, float y, pl_light_sample *out) {

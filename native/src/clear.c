@@ -1,4 +1,4 @@
-/* Light through triangles that let some of it pass: glass, thin cloth, what an image cuts out.
+/* Light through triangles that let some of it pass: glass, thin cloth, what an image cuts out, what some rays miss.
  * SPDX-License-Identifier: GPL-3.0-or-later */
 #include "clear.h"
 
@@ -25,7 +25,7 @@ pl_status clear_copy(const pl_clear *from, size_t triangle_count, pl_clear *out_
     if (!maps_are_valid(from, triangle_count))
         return PL_ERR_ARGUMENT;
     *out_clear = (pl_clear){.transmittance = copy_of(from->transmittance, 3 * sizeof(float) * triangle_count),
-                            .stops = copy_of(from->stops, triangle_count),
+                            .rays = copy_of(from->rays, triangle_count),
                             .maps = copy_of(from->maps, sizeof(int32_t) * triangle_count),
                             /* without a map nothing is looked up, and three million triangles have 72 MB of these */
                             .uvs = copy_of(from->uvs, from->map_count ? 6 * sizeof(float) * triangle_count : 0),
@@ -33,13 +33,13 @@ pl_status clear_copy(const pl_clear *from, size_t triangle_count, pl_clear *out_
                             .map_count = from->map_count,
                             .pixels = copy_of(from->pixels, 3 * sizeof(float) * from->pixel_count),
                             .pixel_count = from->pixel_count};
-    const bool is_complete = out_clear->transmittance && out_clear->stops && out_clear->maps && out_clear->uvs &&
+    const bool is_complete = out_clear->transmittance && out_clear->rays && out_clear->maps && out_clear->uvs &&
                              out_clear->map_shapes && out_clear->pixels;
     return is_complete ? PL_OK : PL_ERR_MEMORY;
 }
 
 void clear_destroy(pl_clear *clear) {
-    const void *const copies[] = {clear->transmittance, clear->stops,      clear->maps,
+    const void *const copies[] = {clear->transmittance, clear->rays,       clear->maps,
                                   clear->uvs,           clear->map_shapes, clear->pixels};
     for (size_t k = 0; k < sizeof copies / sizeof *copies; ++k)
         free((void *)copies[k]);
@@ -100,11 +100,13 @@ bool transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, flo
         const pl_hit hit = clear_hit(scene, origin, direction, near, far);
         if (hit.triangle < 0)
             break;
+        near = nextafterf(hit.distance, INFINITY);
+        if (scene->clear.rays[hit.triangle] & PL_SHADOWS_MISS)
+            continue;
         float through[3];
         transmittance_at(&scene->clear, &hit, through);
         for (int k = 0; k < 3; ++k)
             io_rgb[k] *= through[k];
-        near = nextafterf(hit.distance, INFINITY);
     }
     return io_rgb[0] > 0 || io_rgb[1] > 0 || io_rgb[2] > 0;
 }
@@ -118,9 +120,12 @@ pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_r
         const pl_hit hit = clear_hit(scene, origin, direction, near, end.distance);
         if (hit.triangle < 0)
             break;
+        near = nextafterf(hit.distance, INFINITY);
+        if (scene->clear.rays[hit.triangle] & PL_RAYS_MISS)
+            continue;
         float through[3], passing = 1;
         transmittance_at(&scene->clear, &hit, through);
-        if (scene->clear.stops[hit.triangle]) {
+        if (scene->clear.rays[hit.triangle] & PL_RAYS_STOP) {
             /* exact for grey: nothing is lost then */
             passing = through[1] + ((through[0] - through[1]) + (through[2] - through[1])) / 3;
             if (number_of(&hit) >= passing)
@@ -128,7 +133,6 @@ pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_r
         }
         for (int k = 0; k < 3; ++k)
             io_rgb[k] *= through[k] / passing;
-        near = nextafterf(hit.distance, INFINITY);
     }
     return end;
 }

@@ -8,13 +8,13 @@
 pl_status clear_copy(const pl_clear *from, size_t triangle_count, pl_clear *out_clear);
 void clear_destroy(pl_clear *clear);
 
-/* Multiply io_rgb by what the clear triangles up to `far` let through; returns whether any is left. */
+/* Multiply io_rgb by what the clear triangles up to `far` let through of a shadow ray; returns whether any is left. */
 bool transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, float io_rgb[3]);
 
 /*
- * The first triangle that stops a ray: an opaque one, or a clear one before it, which stops as many rays as it takes
- * light. io_rgb is multiplied by what those that the ray passes let through, by the share of rays that pass. Whether
- * one does hangs on where it hits alone: the same ray ends at the same place in any thread.
+ * The first triangle that stops a scattered ray: an opaque one, or a clear one before it, which stops as many rays as
+ * it takes light. io_rgb is multiplied by what those that the ray passes let through, by the share of rays that pass.
+ * Whether one does hangs on where it hits alone: the same ray ends at the same place in any thread.
  */
 pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_rgb[3]);
 

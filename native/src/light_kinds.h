@@ -47,6 +47,10 @@ static inline const float *parameters_of(const pl_lights *lights, size_t light) 
     return lights->parameters + PL_LIGHT_FLOATS * light;
 }
 
+static inline bool light_is_shadowless(const pl_lights *lights, size_t light) {
+    return parameters_of(lights, light)[PL_LIGHT_FLOATS - 1] > 0;
+}
+
 /* The flat pieces of a lamp whose light has a closed form: how many, 0 of one that has none. */
 size_t light_faces(const pl_lights *lights, size_t light, vec3 point, light_face out_faces[EXACT_TRIANGLES]);
 

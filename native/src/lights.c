@@ -67,5 +67,7 @@ bool light_sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal
         return false;
     for (int k = 0; k < 3; ++k)
         out_sample->irradiance[k] = bounded(out_sample->irradiance[k]);
+    if (light_is_shadowless(lights, light))
+        out_sample->far = 0;
     return true;
 }

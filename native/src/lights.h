@@ -50,7 +50,8 @@ void light_balls_destroy(pl_light_balls *balls);
 float light_importances(const pl_lights *lights, const pl_light_balls *balls, vec3 point, vec3 normal,
                         float worth_a_look, float *out_importances);
 
-/* A point of the light for (x, y) of the unit square; false where it cannot light the receiver. */
+/* A point of the light for (x, y) of the unit square; false where it cannot light the receiver. Of a light that casts
+ * no shadows `far` is 0. */
 bool light_sample(const pl_lights *lights, size_t light, vec3 point, vec3 normal, float x, float y,
                   pl_light_sample *out_sample);
 

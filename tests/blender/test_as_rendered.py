@@ -110,8 +110,14 @@ def test_curves_and_metaballs_have_their_render_resolution(read):
 
 
 def test_all_is_set_back_where_reading_fails(add_cube):
-    add_cube().hide_viewport = True
-    with pytest.raises(ZeroDivisionError), as_rendered(bpy.context.scene, bpy.context.view_layer):
-        assert not bpy.data.objects["Cube"].hide_viewport
-        raise ZeroDivisionError
-    assert bpy.data.objects["Cube"].hide_viewport
+    cube = add_cube()
+    cube.hide_viewport = True
+
+    def fail():
+        with as_rendered(bpy.context.scene, bpy.context.view_layer):
+            assert not cube.hide_viewport
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert cube.hide_viewport

@@ -60,6 +60,7 @@ def lamp(location, watts=100.0):
     light = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))
     light.data.energy, light.data.shadow_soft_size, light.location = watts, 0.1, location
     bpy.context.scene.collection.objects.link(light)
+    return light
 
 
 def blobs():
@@ -142,7 +143,36 @@ def painted(add_mesh, nodes):
     lamp((2, 1.5, 2))
 
 
-@pytest.mark.parametrize("furnish", [curtain, leaves, lampshade, screen, tiles, painted])
+def unseen(add_mesh, nodes):
+    """Lamps and things that some rays miss, as Cycles' switches of ray visibility have it."""
+    material, tree = nodes("board")
+    tree.show(tree.new("BsdfDiffuse", Color=(0.6, 0.6, 0.3, 1)))
+    for k, switch in enumerate(("visible_shadow", "visible_diffuse", "visible_camera")):
+        setattr(quad(add_mesh, switch, (0.5 + k, 1, 1.2), (0.8, 0, 0), (0, 2, 0), material), switch, False)
+    lamp((1.5, 2, 2.5))
+    lamp((3, 1, 0.8), 30.0).data.use_shadow = False
+    lamp((1, 3, 0.8), 500.0).visible_diffuse = False
+    portal = bpy.data.objects.new("portal", bpy.data.lights.new("portal", "AREA"))
+    portal.data.energy, portal.data.cycles.is_portal, portal.location = 500.0, True, (2, 2, 2)
+    bpy.context.scene.collection.objects.link(portal)
+
+
+def modified(add_mesh, nodes):
+    """Things of which the viewport shows other faces than a render, or none."""
+    material, tree = nodes("board")
+    tree.show(tree.new("BsdfDiffuse", Color=(0.6, 0.6, 0.3, 1)))
+    board = quad(add_mesh, "board", (0.5, 0.5, 1.2), (0.8, 0, 0), (0, 0.5, 0), material)
+    array = board.modifiers.new("Array", "ARRAY")
+    array.count, array.relative_offset_displace, array.show_viewport = 5, (0, 1, 0), False
+    quad(add_mesh, "hidden", (2, 1, 1), (1.5, 0, 0), (0, 2, 0), material).hide_viewport = True
+    ball = bpy.data.objects.new("ball", bpy.data.metaballs.new("ball"))
+    ball.data.elements.new().radius, ball.data.resolution, ball.location = 0.8, 4.0, (3, 3, 0.5)
+    ball.data.materials.append(material)
+    bpy.context.scene.collection.objects.link(ball)
+    lamp((1.5, 2, 2.5))
+
+
+@pytest.mark.parametrize("furnish", [curtain, leaves, lampshade, screen, tiles, painted, unseen, modified])
 def test_every_panel_has_the_light_that_cycles_gives_it(room, add_mesh, nodes, furnish):
     furnish(add_mesh, nodes)
     ours, cycles = our_light(room), cycles_light(room)

@@ -160,3 +160,31 @@ def test_unreadable_nodes_of_a_lamp_are_named(add_lamp, read):
     (light,), scene = read()
     np.testing.assert_allclose(light.intensity, 1.0, rtol=FLOAT32)
     assert any("'Candle'" in warning for warning in scene.warnings)
+
+
+def test_lamps_that_cast_no_shadows(add_lamp, read):
+    for name, casts in (("with", True), ("without", False)):
+        add_lamp("POINT", name, use_shadow=casts)
+    lights, _ = read()
+    assert [(light.name, light.casts_shadow) for light in lights] == [("with", True), ("without", False)]
+
+
+def test_lamps_that_diffuse_surfaces_do_not_see_are_left_out(add_lamp, read):
+    add_lamp("POINT", "Seen")
+    add_lamp("POINT", "Unseen").visible_diffuse = False
+    add_lamp("AREA", "Portal").data.cycles.is_portal = True
+    lights, scene = read()
+    assert [light.name for light in lights] == ["Seen"]
+    assert not scene.warnings
+
+
+def test_what_is_not_read_of_lamps_is_told(add_lamp, read):
+    add_lamp("POINT", "Few").data.cycles.max_bounces = 2
+    linked = add_lamp("POINT", "Linked")
+    linked.light_linking.receiver_collection = bpy.data.collections.new("Some")
+    lights, scene = read()
+    assert len(lights) == 2
+    assert set(scene.warnings) == {
+        "light 'Few': its limit of 2 bounces is not read",
+        "'Linked': its light linking is not read: it lights all, and all hide it",
+    }
