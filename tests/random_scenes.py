@@ -134,7 +134,9 @@ def point_lights(draw):
     cone = draw(st.sampled_from(((-2.0, -2.0), (0.5, 0.7), (0.9, 0.9), (0.7, 0.5))))
     radius = draw(st.sampled_from((0.0, 0.0, 1e-30, 0.1, 10.0)))
     towards = draw(st.sampled_from(((0.0, 0.0, -1.0), (1e-9, 0.0, 0.0), (3.0, 4.0, 0.0))))
-    return PointLight("lamp", draw(position), draw(brightness), radius, draw(st.booleans()), towards, cone)
+    lamp = PointLight("lamp", draw(position), draw(brightness), radius, draw(st.booleans()), towards, cone)
+    profile, power = draw(st.none() | st.none() | environments()), draw(st.sampled_from((0.0, 0.0, 1.0, 2.0)))
+    return replace(lamp, profile=profile, distance_power=power)
 
 
 @st.composite

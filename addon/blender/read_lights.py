@@ -7,9 +7,9 @@ from math import cos, pi, sin
 
 import numpy as np
 
+from ..core.environment import Environment
 from ..core.scene import AreaLight, PointLight, SunLight
-from .colour_nodes import blackbody
-from .shader_nodes import Unreadable, constant, constant_colour, surface_shader
+from .lamp_nodes import node_factors
 from .visibility import seen_by, warn_of_linking
 
 # A hard-edged cone is a very narrow soft one: the smoothstep over it stays finite.
@@ -19,14 +19,15 @@ ENOUGH_BOUNCES = 12  # Cycles' own limit for a scene, as Blender sets it
 
 def read_lights(depsgraph, visibility, warn) -> tuple:
     """Every lamp that a render shows and that shines, instances included."""
+    # rendering some may end the depsgraph's iteration
+    lamps = {instance.object.data.original for instance in _shown(depsgraph, visibility)}
+    ordered = sorted(lamps, key=lambda lamp: lamp.name_full)
+    factors = node_factors(ordered, depsgraph.scene.frame_current, warn)
     lights = []
-    for instance in depsgraph.object_instances:
-        if instance.object.type != "LIGHT" or not visibility.shows(instance):
-            continue
+    for instance in _shown(depsgraph, visibility):
         lamp, name = instance.object.data, instance.object.name
-        if not seen_by(instance)[1] or _is_portal(lamp):
-            continue  # Cycles' diffuse surfaces do not see it
-        power = _power(lamp, name, warn)
+        factor = factors[lamp.original.name_full]
+        power = np.maximum(_power(lamp) * factor.colour, 0.0)
         if max(power) <= 0:
             continue
         warn_of_linking(instance.object, warn)
@@ -35,9 +36,26 @@ def read_lights(depsgraph, visibility, warn) -> tuple:
         if not np.isfinite(matrix).all():
             warn(f"light '{name}' has a transform that is not finite: it is left out")
             continue
-        read = READERS[lamp.type](lamp, name, matrix, power, warn)
-        lights += [replace(light, casts_shadow=_casts_shadow(lamp)) for light in read]
+        shape = {"casts_shadow": _casts_shadow(lamp), **_shape(name, factor, matrix)}
+        lights += [replace(light, **shape) for light in READERS[lamp.type](lamp, name, matrix, power, warn)]
     return tuple(lights)
+
+
+def _shown(depsgraph, visibility):
+    """Entries of lamps that diffuse surfaces see in a render."""
+    for instance in depsgraph.object_instances:
+        if instance.object.type == "LIGHT" and visibility.shows(instance):
+            if seen_by(instance)[1] and not _is_portal(instance.object.data):
+                yield instance
+
+
+def _shape(name, factor, matrix):
+    """Of a point or a spot, what its nodes make of it but for its colour."""
+    if factor.profile is None:
+        return {"distance_power": factor.distance_power} if factor.distance_power else {}
+    left, _, right = np.linalg.svd(matrix[:3, :3])  # the nearest rotation, or reflection
+    to_lamp = tuple(_triple(row) for row in (left @ right).T)
+    return {"distance_power": factor.distance_power, "profile": Environment(name, factor.profile, to_lamp)}
 
 
 def _of_cycles(lamp, name, otherwise):
@@ -59,34 +77,10 @@ def _warn_of_bounces(lamp, name, warn):
         warn(f"light '{name}': its limit of {most} bounces is not read")
 
 
-def _power(lamp, name, warn):
-    """P = energy x colour x 2^exposure x what its nodes say, per channel; [W], of a sun [W/m^2]."""
+def _power(lamp):
+    """P = energy x colour x 2^exposure, per channel, without what its nodes say; [W], of a sun [W/m^2]."""
     power = np.array(lamp.color[:], float) * lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0)
-    if getattr(lamp, "use_temperature", False):
-        power *= np.array(lamp.temperature_color[:])
-    if lamp.use_nodes and lamp.node_tree is not None:
-        power = power * _node_factor(lamp, name, warn)
-    return np.maximum(power, 0.0)
-
-
-def _node_factor(lamp, name, warn):
-    try:
-        shader = surface_shader(lamp.node_tree, "OUTPUT_LIGHT")
-        if shader is None:
-            return np.zeros(3)
-        if shader.node.type != "EMISSION":
-            raise Unreadable(f"{shader.node.bl_label} node")
-        return _node_colour(shader.feeding("Color")) * constant(shader.feeding("Strength"))
-    except Unreadable as error:
-        warn(f"light '{name}': its {error} cannot be read: its own colour and power are used")
-        return np.ones(3)
-
-
-def _node_colour(reached):
-    """A colour that is the same in all directions."""
-    if not reached.is_constant and reached.node.type == "BLACKBODY":
-        return blackbody(constant(reached.feeding(0)))
-    return constant_colour(reached)
+    return power * np.array(lamp.temperature_color[:]) if getattr(lamp, "use_temperature", False) else power
 
 
 def _is_normalised(lamp):

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .environment import from_octahedron
 from .scene import AreaLight, PointLight, Scene, SunLight
 from .textures import textured_colours
 
 POINT, AREA, SUN, MESH = 0, 1, 2, 3
-LIGHT_FLOATS = 20
+LIGHT_FLOATS, PROFILE_SIDE = 20, 128  # PL_LIGHT_FLOATS, PL_PROFILE_SIDE
+PROFILE_AT = 13  # in a point's row: the number of its profile, 0 for none
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 MOST_GROUPS = 96  # groups of glowing triangles: each receiver weighs every group
@@ -33,13 +35,14 @@ class Emitters:
     corners: np.ndarray  # float32 (N, 9) of glowing triangles
     radiances: np.ndarray  # float32 (N, 6) of front and back
     cumulative: np.ndarray  # float32 (N,) chance of the group's triangles before each
+    profiles: np.ndarray  # float32 (K, PROFILE_SIDE^2) by direction
 
     def __len__(self) -> int:
         return len(self.kinds)
 
     def arrays(self) -> tuple:
         """In the kernel's order."""
-        return self.kinds, self.parameters, self.corners, self.radiances, self.cumulative
+        return self.kinds, self.parameters, self.corners, self.radiances, self.cumulative, self.profiles
 
 
 def emitters_of(scene: Scene, centre) -> Emitters:
@@ -47,12 +50,15 @@ def emitters_of(scene: Scene, centre) -> Emitters:
     table = [_light_row(light, np.asarray(centre)) for light in scene.lights]
     parameters = _padded([row for _, row in table])
     parameters[:, -1] = [not light.casts_shadow for light in scene.lights]
+    shaped = [row for row, light in enumerate(scene.lights) if getattr(light, "profile", None) is not None]
+    parameters[shaped, PROFILE_AT] = 1 + np.arange(len(shaped))
     lamps = Emitters(
         kinds=np.array([kind for kind, _ in table], np.int32),
         parameters=parameters,
         corners=np.zeros((0, 9), np.float32),
         radiances=np.zeros((0, 6), np.float32),
         cumulative=np.zeros(0, np.float32),
+        profiles=_profiles([scene.lights[row].profile for row in shaped]),
     )
     corners, radiances = _glowing_triangles(scene)
     return with_sources(lamps, corners, np.concatenate([radiances, radiances], axis=1), centre)
@@ -74,7 +80,17 @@ def with_sources(emitters: Emitters, corners, radiances, centre) -> Emitters:
         corners=np.concatenate([emitters.corners, corners.reshape(-1, 9).astype(np.float32)]),
         radiances=np.concatenate([emitters.radiances, radiances.astype(np.float32)]),
         cumulative=np.concatenate([emitters.cumulative, cumulative.astype(np.float32)]),
+        profiles=emitters.profiles,
     )
+
+
+def _profiles(profiles):
+    """Environments (K,) over an octahedron laid out flat, their first channel: float32 (K, PROFILE_SIDE^2)."""
+    places = (np.arange(PROFILE_SIDE) + 0.5) / PROFILE_SIDE * 2 - 1
+    y, x = (part.ravel() for part in np.meshgrid(places, places, indexing="ij"))
+    directions = from_octahedron(x, y)
+    rows = [profile.seen(directions)[:, 0] for profile in profiles]
+    return np.array(rows, np.float32).reshape(-1, PROFILE_SIDE**2)
 
 
 def _padded(rows):
@@ -85,7 +101,8 @@ def _light_row(light, centre):
     if isinstance(light, PointLight):
         position = np.asarray(light.position) - centre
         soft = float(light.soft_falloff and light.radius > 0)
-        return POINT, [*position, *light.intensity, light.radius, soft, *light.direction, *light.cone_cosines]
+        shape = [light.radius, soft, *light.direction, *light.cone_cosines]
+        return POINT, [*position, *light.intensity, *shape, 0.0, light.distance_power]
     if isinstance(light, AreaLight):
         position = np.asarray(light.centre) - centre
         shape = [float(light.is_ellipse), light.spread]

@@ -12,6 +12,17 @@ UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ORTHONORMAL = 1e-4  # how far the rows of a rotation may be off: matrices come from float32
 
 
+def from_octahedron(x, y):
+    """Unit vectors (..., 3) of places in [-1, 1] on an octahedron laid out flat, as the kernel's maps are.
+
+    Engelhardt & Dachsbacher 2008, "Octahedron environment maps": |x| + |y| + |z| = 1, the lower half folded out.
+    """
+    z = 1 - np.abs(x) - np.abs(y)
+    folded_x, folded_y = (1 - np.abs(y)) * np.copysign(1, x), (1 - np.abs(x)) * np.copysign(1, y)
+    points = np.stack([np.where(z < 0, folded_x, x), np.where(z < 0, folded_y, y), z], axis=-1)
+    return points / np.linalg.norm(points, axis=-1, keepdims=True)
+
+
 @dataclass(frozen=True, slots=True)
 class Environment:
     """An equirectangular image, as Cycles lays it out: straight down in row 0, +X in the middle, +Y left of it.

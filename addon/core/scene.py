@@ -154,7 +154,9 @@ class PointLight:
 
     ``cone_cosines`` makes it a spot: full inside cos >= cone_cosines[1], none outside cos <= cone_cosines[0],
     smoothstep between; ``direction`` is where it looks. ``soft_falloff``: a disc that always faces the receiver, as
-    Cycles does it.
+    Cycles does it. ``profile``: what the intensity is multiplied by in each direction, the first channel of what would
+    be seen there from the light; None = 1. ``distance_power``: what it gives is multiplied by this power of the
+    distance [m]; 0 = the square law.
     """
 
     name: str
@@ -165,6 +167,8 @@ class PointLight:
     direction: tuple[float, float, float] = (0.0, 0.0, -1.0)
     cone_cosines: tuple[float, float] = (-2.0, -2.0)
     casts_shadow: bool = True  # False = it shines through everything
+    profile: Environment | None = None
+    distance_power: float = 0.0
 
     def __post_init__(self):
         owner = f"light {self.name}"
@@ -173,6 +177,7 @@ class PointLight:
         require_number(owner, "radius", self.radius, 0.0, LARGEST_COORDINATE)
         require_direction(owner, "direction", self.direction)
         require_vector(owner, "cone_cosines", self.cone_cosines, 2.0, count=2)
+        require_number(owner, "distance_power", self.distance_power, 0.0, 2.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .emitters import LUMINANCE
-from .environment import Environment
+from .environment import Environment, from_octahedron
 from .scene import Scene, SunLight, exitance_from_radiance
 
 SIDE = 128  # of the map that rays look up, about a degree a texel: what is finer no diffuse surface shows
@@ -42,16 +42,10 @@ def sky_map(scene: Scene):
 
 
 def _directions(row):
-    """Unit vectors through TAPS^2 places of every texel in a row of the map, (TAPS * SIDE * TAPS, 3).
-
-    Engelhardt & Dachsbacher 2008, "Octahedron environment maps": |x| + |y| + |z| = 1, the lower half folded out.
-    """
+    """Unit vectors through TAPS^2 places of every texel in a row of the map, (TAPS * SIDE * TAPS, 3)."""
     places = (np.arange(SIDE * TAPS) + 0.5) / (SIDE * TAPS) * 2 - 1
     y, x = (part.ravel() for part in np.meshgrid(places[row * TAPS : (row + 1) * TAPS], places, indexing="ij"))
-    z = 1 - np.abs(x) - np.abs(y)
-    folded_x, folded_y = (1 - np.abs(y)) * np.copysign(1, x), (1 - np.abs(x)) * np.copysign(1, y)
-    points = np.stack([np.where(z < 0, folded_x, x), np.where(z < 0, folded_y, y), z], axis=1)
-    return points / np.linalg.norm(points, axis=1, keepdims=True)
+    return from_octahedron(x, y)
 
 
 def _parted(environment: Environment, radiance):

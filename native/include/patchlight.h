@@ -224,7 +224,8 @@ typedef struct pl_receivers {
  *
  * A row of `parameters` (PL_LIGHT_FLOATS floats) for each light, by kind:
  *   POINT  position, intensity, radius, is_soft (1 = disc that faces the receiver), direction, cone cosines
- *          outer and inner (-2, -2: no cone)
+ *          outer and inner (-2, -2: no cone), its profile (0: none, else the k-th has the number k), power of the
+ *          distance [m] that the light is multiplied by (0 is the square law, 2 none)
  *   AREA   centre, radiance, axis u (half side), axis v (half side), is_ellipse, spread (full angle)
  *   SUN    direction to the sun, irradiance, angular radius
  *   MESH   centre, bounding radius, flux-like weight (sum of area * radiance) for choosing; first and
@@ -232,10 +233,12 @@ typedef struct pl_receivers {
  * The last number is 1 for a light that casts no shadows, else 0.
  * Emitting triangles: corners (9 floats), radiance of front and back (6); a MESH light's triangles are
  * chosen with the chances whose cumulative sums, from 0 to 1, are `cumulative`.
+ * Profiles (PL_PROFILE_SIDE^2 floats): what the intensity is multiplied by, by the direction from the light, over an
+ * octahedron laid out flat as pl_solution.sky is, bilinearly.
  * Positions are relative to `centre`, which the scene was re-centred by: pl_scene_centre.
  */
 enum { PL_LIGHT_POINT = 0, PL_LIGHT_AREA = 1, PL_LIGHT_SUN = 2, PL_LIGHT_MESH = 3 };
-enum { PL_LIGHT_FLOATS = 20 };
+enum { PL_LIGHT_FLOATS = 20, PL_PROFILE_SIDE = 128 };
 typedef struct pl_lights {
     const int32_t *kinds;
     const float *parameters;
@@ -244,6 +247,8 @@ typedef struct pl_lights {
     const float *triangle_radiances;
     const float *cumulative;
     size_t triangle_count;
+    const float *profiles;
+    size_t profile_count;
 } pl_lights;
 void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
 

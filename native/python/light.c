@@ -6,23 +6,24 @@
 
 #include <math.h>
 
-/* The five arrays of a light table, as every function that samples lights takes them. */
+/* The six arrays of a light table, as every function that samples lights takes them. */
 #define LIGHT_ARRAYS(at)                                                                                               \
     {"light_kinds", 'i', 1, -1, false, {0}},                                                                           \
         {"light_parameters", 'f', PL_LIGHT_FLOATS, AS_MANY_ROWS_AS(at), false, {0}},                                   \
         {"light_corners", 'f', 9, -1, false, {0}}, {"light_radiances", 'f', 6, AS_MANY_ROWS_AS((at) + 2), false, {0}}, \
-    {                                                                                                                  \
-        "light_cumulative", 'f', 1, AS_MANY_ROWS_AS((at) + 2), false, {0}                                              \
+        {"light_cumulative", 'f', 1, AS_MANY_ROWS_AS((at) + 2), false, {0}}, {                                         \
+        "light_profiles", 'f', PL_PROFILE_SIDE *PL_PROFILE_SIDE, -1, false, {0}                                        \
     }
 #define RECEIVER_ARRAYS(at)                                                                                            \
     {"positions", 'd', 3, -1, false, {0}}, {"normals", 'f', 3, AS_MANY_ROWS_AS(at), false, {0}}, {                     \
         "triangle_sides", 'i', 1, AS_MANY_ROWS_AS(at), false, {0}                                                      \
     }
-enum { LIGHT_ARRAY_COUNT = 5, RECEIVER_ARRAY_COUNT = 3 };
+enum { LIGHT_ARRAY_COUNT = 6, RECEIVER_ARRAY_COUNT = 3 };
 
 static pl_lights lights_of(const door_array *arrays) {
-    return (pl_lights){arrays[0].view.buf, arrays[1].view.buf, door_rows(&arrays[0]), arrays[2].view.buf,
-                       arrays[3].view.buf, arrays[4].view.buf, door_rows(&arrays[4])};
+    return (pl_lights){arrays[0].view.buf,    arrays[1].view.buf, door_rows(&arrays[0]),
+                       arrays[2].view.buf,    arrays[3].view.buf, arrays[4].view.buf,
+                       door_rows(&arrays[4]), arrays[5].view.buf, door_rows(&arrays[5])};
 }
 
 static pl_receivers receivers_of(const door_array *arrays) {

@@ -29,7 +29,7 @@ static void describe_ball(const pl_lights *lights, size_t light, pl_light_balls 
         io_balls->strength[light] = 0;
     }
     io_balls->strength[light] = lesser(io_balls->strength[light], 1e30f);
-    const bool is_plain = lights->kinds[light] == PL_LIGHT_POINT && p[12] < -1;
+    const bool is_plain = lights->kinds[light] == PL_LIGHT_POINT && point_is_plain(p);
     if (!is_plain)
         io_balls->special[io_balls->special_count++] = light;
 }
@@ -89,8 +89,8 @@ static float special_importance(const pl_lights *lights, size_t light, vec3 poin
     case PL_LIGHT_MESH:
         return !closely ? ball : ball > 0 ? mesh_importance(lights, p, point, normal, ball) : 0;
     default: {
-        const point_light lamp = point_of(p);
-        return ball > 0 ? ball * cone_importance(&lamp, point) : 0;
+        const point_light lamp = point_of(lights, light);
+        return ball > 0 ? ball * point_importance(&lamp, point) : 0;
     }
     }
 }

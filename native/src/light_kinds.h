@@ -18,6 +18,8 @@ typedef struct point_light {
     float radius, is_soft;
     vec3 direction;
     float cos_outer, cos_inner;
+    const float *profile; /* NULL: the same in all directions */
+    float distance_power;
 } point_light;
 
 typedef struct area_light {
@@ -31,10 +33,6 @@ typedef struct mesh_light {
     size_t first, count;
 } mesh_light;
 
-static inline point_light point_of(const float *p) {
-    return (point_light){vec3_from(p), vec3_from(p + 3), p[6], p[7], vec3_from(p + 8), p[11], p[12]};
-}
-
 static inline area_light area_of(const float *p) {
     return (area_light){vec3_from(p), vec3_from(p + 3), vec3_from(p + 6), vec3_from(p + 9), p[12], p[13]};
 }
@@ -46,6 +44,16 @@ static inline mesh_light mesh_of(const float *p) {
 static inline const float *parameters_of(const pl_lights *lights, size_t light) {
     return lights->parameters + PL_LIGHT_FLOATS * light;
 }
+
+static inline point_light point_of(const pl_lights *lights, size_t light) {
+    const float *p = parameters_of(lights, light);
+    const float *profile =
+        p[13] >= 1 ? lights->profiles + (size_t)PL_PROFILE_SIDE * PL_PROFILE_SIDE * ((size_t)p[13] - 1) : NULL;
+    return (point_light){vec3_from(p), vec3_from(p + 3), p[6], p[7], vec3_from(p + 8), p[11], p[12], profile, p[14]};
+}
+
+/* Whether a point light gives the same all round, by the square law. */
+static inline bool point_is_plain(const float *p) { return p[12] < -1 && !(p[13] >= 1) && p[14] == 0; }
 
 static inline bool light_is_shadowless(const pl_lights *lights, size_t light) {
     return parameters_of(lights, light)[PL_LIGHT_FLOATS - 1] > 0;
@@ -71,8 +79,8 @@ static inline float rounding_of(vec3 p) {
 }
 
 /* point_light.c: `p` are the light's parameters in the table. */
-float cone_importance(const point_light *light, vec3 point);
-bool sample_point_light(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out);
+float point_importance(const point_light *light, vec3 point);
+bool sample_point_light(const point_light *light, vec3 point, vec3 normal, float x, float y, pl_light_sample *out);
 float sun_importance(const float *p, vec3 normal);
 bool sample_sun(const float *p, vec3 normal, float x, float y, pl_light_sample *out);
 

@@ -10,6 +10,8 @@ bool lights_are_valid(const pl_lights *lights) {
         const float most = (float)lights->triangle_count;
         if (lights->kinds[light] == PL_LIGHT_MESH && !(p[5] >= 0 && p[6] >= 1 && p[5] + p[6] <= most))
             return false;
+        if (lights->kinds[light] == PL_LIGHT_POINT && !(p[13] >= 0 && p[13] <= (float)lights->profile_count))
+            return false;
     }
     return true;
 }
@@ -50,8 +52,10 @@ static bool sample(const pl_lights *lights, size_t light, vec3 point, vec3 norma
                    pl_light_sample *out_sample) {
     const float *p = parameters_of(lights, light);
     switch (lights->kinds[light]) {
-    case PL_LIGHT_POINT:
-        return sample_point_light(p, point, normal, x, y, out_sample);
+    case PL_LIGHT_POINT: {
+        const point_light lamp = point_of(lights, light);
+        return sample_point_light(&lamp, point, normal, x, y, out_sample);
+    }
     case PL_LIGHT_AREA:
         return sample_area(p, point, normal, x, y, out_sample);
     case PL_LIGHT_SUN:

@@ -1,5 +1,6 @@
 /* Points, balls and spots, and suns. Radiometry as Cycles has it. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "light_kinds.h"
+#include "sky.h"
 
 /* Smoothstep from the cone's edge inwards. */
 static float cone_share(const point_light *light, vec3 from_light) {
@@ -11,13 +12,51 @@ static float cone_share(const point_light *light, vec3 from_light) {
     return t * t * (3 - 2 * t);
 }
 
-/* What a spot's cone lets through of its ball's importance. */
-float cone_importance(const point_light *light, vec3 point) {
+/* Beyond the square's edge lies the other half of that edge. */
+static float profile_texel(const float *profile, int32_t column, int32_t row) {
+    const int32_t side = PL_PROFILE_SIDE;
+    if (column < 0 || column >= side) {
+        column = column < 0 ? 0 : side - 1;
+        row = side - 1 - row;
+    }
+    if (row < 0 || row >= side) {
+        row = row < 0 ? 0 : side - 1;
+        column = side - 1 - column;
+    }
+    return profile[side * row + column];
+}
+
+static float profile_share(const float *profile, vec3 direction) {
+    if (!profile)
+        return 1;
+    float x, y;
+    octahedron_place(direction, &x, &y);
+    const float from_left = (0.5f * lesser(greater(x, -1), 1) + 0.5f) * PL_PROFILE_SIDE - 0.5f;
+    const float from_low = (0.5f * lesser(greater(y, -1), 1) + 0.5f) * PL_PROFILE_SIDE - 0.5f;
+    const int32_t column = (int32_t)floorf(from_left), row = (int32_t)floorf(from_low);
+    const float right = from_left - (float)column, up = from_low - (float)row;
+    float sum = 0;
+    for (int corner = 0; corner < 4; ++corner) {
+        const int is_right = corner & 1, is_up = corner >> 1;
+        const float weight = (is_right ? right : 1 - right) * (is_up ? up : 1 - up);
+        sum += weight * profile_texel(profile, column + is_right, row + is_up);
+    }
+    return sum;
+}
+
+/* What the light sends in a direction, as a share of its intensity, over the square law. */
+static float share_of_intensity(const point_light *light, vec3 from_light, float distance) {
+    const float far = light->distance_power == 0 ? 1 : powf(distance, light->distance_power);
+    return cone_share(light, from_light) * profile_share(light->profile, from_light) * far;
+}
+
+/* How much more or less than its ball a light gives that is not plain. */
+float point_importance(const point_light *light, vec3 point) {
     const vec3 to = vec3_sub(light->position, point);
     const float distance = vec3_length(to);
     if (distance <= light->radius)
         return 1;
-    const float share = cone_share(light, vec3_scale(to, -1 / distance));
+    const float share = share_of_intensity(light, vec3_scale(to, -1 / distance), distance);
     /* a sphere's edge can look into a cone that its centre is out of */
     return greater(share, light->radius > 0 ? 0.01f : 0);
 }
@@ -44,41 +83,42 @@ static bool sample_sphere(const point_light *light, vec3 to, float distance, flo
     return true;
 }
 
-bool sample_point_light(const float *p, vec3 point, vec3 normal, float x, float y, pl_light_sample *out) {
-    const point_light light = point_of(p);
-    const vec3 to = vec3_sub(light.position, point);
+bool sample_point_light(const point_light *light, vec3 point, vec3 normal, float x, float y, pl_light_sample *out) {
+    const vec3 to = vec3_sub(light->position, point);
     const float distance = vec3_length(to);
     float factor;
     if (distance <= 0)
         return false;
 
-    if (light.radius <= 0) {
+    if (light->radius <= 0) {
         out->direction = to;
         out->far = far_of_face;
         const float cosine = vec3_dot(to, normal) / distance;
-        factor = cosine * cone_share(&light, vec3_scale(to, -1 / distance)) / (distance * distance);
-    } else if (light.is_soft > 0) {
+        factor = cosine * share_of_intensity(light, vec3_scale(to, -1 / distance), distance) / (distance * distance);
+    } else if (light->is_soft > 0) {
         /* a disc of radiance I / (pi r^2) that always faces the receiver */
         vec3 u, v;
         const vec3 axis = vec3_scale(to, 1 / distance);
         vec3_basis(axis, &u, &v);
-        const float radius = light.radius * sqrtf(x), angle = 2 * PL_PI * y;
+        const float radius = light->radius * sqrtf(x), angle = 2 * PL_PI * y;
         const vec3 across = vec3_mul_add(u, radius * cosf(angle), vec3_scale(v, radius * sinf(angle)));
         out->direction = vec3_add(to, across);
         out->far = 1;
         const float square = vec3_dot(out->direction, out->direction), reach = sqrtf(square);
         const float cosine = vec3_dot(out->direction, normal) / reach;
         factor = cosine * (distance / reach) / square;
-        factor *= cone_share(&light, vec3_scale(out->direction, -1 / reach));
+        factor *= share_of_intensity(light, vec3_scale(out->direction, -1 / reach), distance);
     } else {
         /* a sphere of radiance P / (4 pi^2 r^2) = I / (pi r^2), times its solid angle: r^2 cancels, however small */
         float over_disc;
-        if (!sample_sphere(&light, to, distance, x, y, &out->direction, &out->far, &over_disc))
+        if (!sample_sphere(light, to, distance, x, y, &out->direction, &out->far, &over_disc))
             return false;
         factor = vec3_dot(out->direction, normal) * over_disc;
-        factor *= cone_share(&light, vec3_scale(out->direction, -1));
+        factor *= share_of_intensity(light, vec3_scale(out->direction, -1), distance);
     }
-    scaled(p + 3, factor, out->irradiance);
+    out->irradiance[0] = light->intensity.x * factor;
+    out->irradiance[1] = light->intensity.y * factor;
+    out->irradiance[2] = light->intensity.z * factor;
     return factor > 0;
 }
 

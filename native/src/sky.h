@@ -16,16 +16,19 @@ static inline size_t sky_texel(float place, size_t side) {
     return texel < 1 ? 0 : texel < (float)(side - 1) ? (size_t)texel : side - 1;
 }
 
+/* Where a direction, not 0, lies on the flat octahedron, from -1 to 1. */
+static inline void octahedron_place(vec3 direction, float *out_x, float *out_y) {
+    const float scale = 1 / (fabsf(direction.x) + fabsf(direction.y) + fabsf(direction.z));
+    const float x = direction.x * scale, y = direction.y * scale;
+    *out_x = direction.z < 0 ? copysignf(1 - fabsf(y), x) : x;
+    *out_y = direction.z < 0 ? copysignf(1 - fabsf(x), y) : y;
+}
+
 static inline const float *sky_seen(const float *sky, size_t side, vec3 direction) {
     if (side == 1)
         return sky;
-    const float scale = 1 / (fabsf(direction.x) + fabsf(direction.y) + fabsf(direction.z));
-    float x = direction.x * scale, y = direction.y * scale;
-    if (direction.z < 0) {
-        const float folded = copysignf(1 - fabsf(y), x);
-        y = copysignf(1 - fabsf(x), y);
-        x = folded;
-    }
+    float x, y;
+    octahedron_place(direction, &x, &y);
     return sky + 3 * (side * sky_texel(y, side) + sky_texel(x, side));
 }
 

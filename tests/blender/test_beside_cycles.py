@@ -172,7 +172,26 @@ def modified(add_mesh, nodes):
     lamp((1.5, 2, 2.5))
 
 
-@pytest.mark.parametrize("furnish", [curtain, leaves, lampshade, screen, tiles, painted, unseen, modified])
+def fittings(add_mesh, nodes):
+    """A lamp of a photometric file, turned, and one whose light does not fall off with the square of the distance."""
+    text = bpy.data.texts.new("lamp.ies")
+    text.write("IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 5 3 1 2 0 0 0\n1 1 100\n0 30 60 90 180\n0 90 180\n")
+    text.write("1000 900 300 100 50\n1000 700 500 100 50\n1000 300 100 0 50\n")
+    for k, kind in enumerate(("ShaderNodeTexIES", "ShaderNodeLightFalloff")):
+        light = lamp((1 + 2 * k, 2, 2.2 - k), 20.0)
+        light.rotation_euler, light.data.use_nodes = (0.5, 0.3, 0.7), True
+        tree = light.data.node_tree
+        node = tree.nodes.new(kind)
+        output = node.outputs[0]
+        if k == 0:
+            node.mode, node.ies = "INTERNAL", text
+        else:
+            output = node.outputs["Linear"]
+            node.inputs["Strength"].default_value = 1.0
+        tree.links.new(output, next(n for n in tree.nodes if n.type == "EMISSION").inputs["Strength"])
+
+
+@pytest.mark.parametrize("furnish", [curtain, leaves, lampshade, screen, tiles, painted, unseen, modified, fittings])
 def test_every_panel_has_the_light_that_cycles_gives_it(room, add_mesh, nodes, furnish):
     furnish(add_mesh, nodes)
     ours, cycles = our_light(room), cycles_light(room)

@@ -8,7 +8,9 @@ import bpy
 import numpy as np
 import pytest
 
+from addon.blender import lamp_nodes
 from addon.blender.read_scene import read_scene
+from addon.blender.render_lights import rendered_lamp
 from addon.core.scene import AreaLight, PointLight, SunLight
 
 pytestmark = pytest.mark.usefixtures("empty_file")
@@ -152,14 +154,95 @@ def test_a_black_body_gives_a_lamp_its_colour_and_not_its_power(add_lamp, read):
     assert scene.warnings == ()
 
 
-def test_unreadable_nodes_of_a_lamp_are_named(add_lamp, read):
-    lamp = add_lamp("POINT", "Candle", energy=4 * pi).data
-    lamp.use_nodes = True
-    emission = next(n for n in lamp.node_tree.nodes if n.type == "EMISSION")
-    lamp.node_tree.links.new(lamp.node_tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], emission.inputs["Color"])
+def nodes_of(lamp):
+    """The node tree of a lamp, and its Emission node."""
+    lamp.data.use_nodes = True
+    tree = lamp.data.node_tree
+    return tree, next(n for n in tree.nodes if n.type == "EMISSION")
+
+
+def with_profile(lamp, measured="1000 800 500 100 0"):
+    """Give a lamp the nodes of a photometric file: candela at 0, 30, 60, 90 and 180 degrees from straight down."""
+    tree, emission = nodes_of(lamp)
+    text = bpy.data.texts.new("lamp.ies")
+    header = "IESNA:LM-63-1995\nTILT=NONE\n1 1000 1 5 1 1 2 0 0 0\n1 1 100\n"
+    text.write(f"{header}0 30 60 90 180\n0\n{measured}\n")
+    node = tree.nodes.new("ShaderNodeTexIES")
+    node.mode, node.ies = "INTERNAL", text
+    tree.links.new(node.outputs[0], emission.inputs["Strength"])
+    return emission
+
+
+def test_unreadable_nodes_of_a_sun_are_named(add_lamp, read):
+    tree, emission = nodes_of(add_lamp("SUN", "Candle", energy=1.0))
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], emission.inputs["Color"])
+    (light,), scene = read()
+    np.testing.assert_allclose(light.irradiance, 1.0, rtol=FLOAT32)
+    assert "light 'Candle': its Noise Texture node cannot be read: its own colour and power are used" in scene.warnings
+
+
+@pytest.mark.parametrize("kind", ["POINT", "SPOT"])
+def test_a_photometric_file_gives_a_lamp_its_profile(add_lamp, read, kind):
+    """In the lamp's own space: one that is turned to look along +X sends most there."""
+    emission = with_profile(add_lamp(kind, rotation=(0, -pi / 2, 0), energy=4 * pi))
+    emission.inputs["Color"].default_value = (*COLOUR, 1)
+    (light,), scene = read()
+    angles = np.radians([0, 30, 60, 90, 180])
+    towards = np.stack([np.cos(angles), np.sin(angles) * 0.6, np.sin(angles) * 0.8], axis=1)
+    found = light.profile.seen(towards)[:, 0]
+    # a pixel is 1.4 degrees wide, along which the largest slope changes what it is by 2 %; Cycles' cubics between the
+    # angles overshoot, so that the largest is not at 0
+    np.testing.assert_allclose(found / found[0], [1, 0.8, 0.5, 0.1, 0], atol=0.02)
+    np.testing.assert_allclose(np.array(light.intensity) / light.intensity[0], np.array(COLOUR), rtol=1e-3)
+    assert light.distance_power == 0
+    assert not scene.warnings
+    assert [len(blocks) for blocks in (bpy.data.scenes, bpy.data.lights, bpy.data.cameras)] == [1, 1, 0]
+
+
+def test_lamps_of_one_data_block_are_rendered_once(add_lamp, read, monkeypatch):
+    lamp = add_lamp("POINT", energy=4 * pi)
+    with_profile(lamp)
+    for k in range(3):
+        other = lamp.copy()
+        other.rotation_euler = (k, 0, 0)
+        bpy.context.scene.collection.objects.link(other)
+    calls = []
+    monkeypatch.setattr(lamp_nodes, "rendered_lamp", lambda *which: calls.append(which) or rendered_lamp(*which))
+    lights, _ = read()
+    assert len(calls) == 1
+    assert len({light.profile.to_image for light in lights}) == 3  # one is not turned, and one by 0
+
+
+@pytest.mark.parametrize(("output", "power"), [("Quadratic", 0), ("Linear", 1), ("Constant", 2)])
+def test_light_falloff_is_a_power_of_the_distance(add_lamp, read, output, power):
+    tree, emission = nodes_of(add_lamp("POINT", energy=4 * pi))
+    falloff = tree.nodes.new("ShaderNodeLightFalloff")
+    falloff.inputs["Strength"].default_value = 3.0
+    tree.links.new(falloff.outputs[output], emission.inputs["Strength"])
+    (light,), scene = read()
+    np.testing.assert_allclose(light.intensity, 3.0, rtol=1e-3)  # the ball's faces are flat
+    assert (light.profile, light.distance_power) == (None, power)
+    assert not scene.warnings
+
+
+def test_several_powers_of_the_distance_are_told(add_lamp, read):
+    tree, emission = nodes_of(add_lamp("POINT", "Both", energy=4 * pi))
+    falloff, added = tree.nodes.new("ShaderNodeLightFalloff"), tree.nodes.new("ShaderNodeMath")
+    for k, output in enumerate(("Linear", "Constant")):
+        tree.links.new(falloff.outputs[output], added.inputs[k])
+    tree.links.new(added.outputs[0], emission.inputs["Strength"])
     (light,), scene = read()
     np.testing.assert_allclose(light.intensity, 1.0, rtol=FLOAT32)
-    assert any("'Candle'" in warning for warning in scene.warnings)
+    assert any("'Both'" in said and "mix several powers" in said for said in scene.warnings)
+
+
+def test_a_colour_that_differs_by_direction_is_told(add_lamp, read):
+    tree, emission = nodes_of(add_lamp("POINT", "Disco", energy=4 * pi))
+    geometry = tree.nodes.new("ShaderNodeNewGeometry")
+    tree.links.new(geometry.outputs["Normal"], emission.inputs["Color"])
+    lights, scene = read()
+    assert len(lights) == 1
+    assert any("'Disco': its colour differs by direction" in said for said in scene.warnings)
 
 
 def test_lamps_that_cast_no_shadows(add_lamp, read):

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from addon.core import _kernel
-from addon.core.emitters import LIGHT_FLOATS, LUMINANCE
+from addon.core.emitters import LIGHT_FLOATS, LUMINANCE, PROFILE_SIDE
 from addon.core.kernel import embree
 from addon.core.texel_light import packed
 from tests.random_scenes import placed_meshes
@@ -89,8 +89,12 @@ def light_table(draw):
     kinds = arrays(draw, count, np.int32, st.sampled_from((0, 1, 2, 3, 3, 0, 1, 2, 9)))
     table = arrays(draw, (count, LIGHT_FLOATS), np.float32, lengths)
     table[:, 5:7] = np.where(kinds[:, None] == 3, arrays(draw, (count, 2), np.float32, numbers), table[:, 5:7])
+    table[:, 13] = np.where(
+        kinds == 0, arrays(draw, count, np.float32, st.sampled_from((0, 0, 1, 2, -1))), table[:, 13]
+    )
     corners, radiances = arrays(draw, (glowing, 9), np.float32, lengths), np.ones((glowing, 6), np.float32)
-    return kinds, table, corners, radiances, np.linspace(0, 1, glowing, endpoint=False, dtype=np.float32)
+    profiles = np.full((draw(st.integers(0, 2)), PROFILE_SIDE**2), draw(lengths), np.float32)
+    return kinds, table, corners, radiances, np.linspace(0, 1, glowing, endpoint=False, dtype=np.float32), profiles
 
 
 def receivers(draw, sides, count):

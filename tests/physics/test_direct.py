@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from addon.core.emitters import LUMINANCE, emitters_of
+from addon.core.environment import Environment
 from addon.core.receivers import surface_receivers
 from addon.core.scene import AreaLight, Material, PointLight, SunLight
 from tests.physics.lighting import SINGLE, direct_light, floor, floor_receivers, full_light, random_points
 from tests.reference.polygon import point_to_polygon
-from tests.scenes import BLACK, Part, closed_box, kernel_of, rectangle, scene_of
+from tests.scenes import BLACK, Part, closed_box, kernel_of, random_rotation, rectangle, scene_of
 
 UP = np.array([0, 0, 1.0])
 COLOUR = np.array([3.0, 2.0, 0.5])
@@ -220,3 +221,31 @@ def test_an_opaque_board_casts_the_shadow_that_geometry_says():
     points = np.stack([x, 0.1 + 0 * x, 0 * x], axis=1)
     values, _ = direct_light([PointLight("lamp", (0, 0, 2.0), tuple(COLOUR))], points, [board])
     assert ((values[:, 0] == 0) == (np.abs(x) < 0.5)).all()
+
+
+def test_a_profile_and_a_power_of_the_distance_multiply_what_a_point_gives():
+    """E = I p(direction) cos d^k / d^2 of a profile that varies slowly, turned: of a place and a radius of its own."""
+    elevation, azimuth = np.meshgrid(*((np.arange(n) + 0.5) / n for n in (256, 512)), indexing="ij")
+    unturned = Environment("plain", np.zeros((256, 512, 3), np.float32))
+    seen = unturned.directions(256 * elevation - 0.5, 512 * azimuth - 0.5)
+
+    def by_direction(towards):
+        return 0.5 + 0.3 * towards[..., 0] + 0.2 * towards[..., 1] * towards[..., 2]
+
+    turn = random_rotation(np.random.default_rng(5))
+    pixels = np.repeat(by_direction(seen)[..., None], 3, axis=2).astype(np.float32)
+    points, position = random_points(300, np.random.default_rng(4)), np.array([0.3, -0.2, 1.1])
+    to = points - position
+    distance = np.linalg.norm(to, axis=1)
+    share = by_direction(to / distance[:, None] @ turn.T)
+    plain = share * position[2] / distance**3
+    for power in (0.0, 1.0, 2.0):
+        for radius in (0.0, 1e-3):
+            lamp = PointLight(
+                "lamp", tuple(position), (3.0, 2.0, 1.0), radius, distance_power=power,
+                profile=Environment("profile", pixels, tuple(map(tuple, turn))),
+            )  # fmt: skip
+            found, _ = direct_light([lamp], points)
+            # two maps, bilinear: an eighth of the square of a texel, .025 rad, times the profile's second derivative
+            expected = (plain * distance**power)[:, None] * (3.0, 2.0, 1.0)
+            assert found == pytest.approx(expected, rel=3e-4 / share.min())
