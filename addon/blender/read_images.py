@@ -10,6 +10,7 @@ from .shader_nodes import Unreadable
 
 # Bounced light does not see texels finer than this; an 8k texture would cost a gigabyte.
 LONGEST_SIDE = 2048
+RIM = 64
 
 LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "scene_linear"}
 
@@ -29,6 +30,26 @@ class Images:
         """The image's alpha as a grey."""
         return self._read_once(image, "alpha", lambda: alpha_pixels(image, self._warn))
 
+    def clipped(self, texture) -> Texture:
+        """With black around it, rim_of texels wide."""
+        rim = rim_of(texture)
+        return self._made(texture, "clipped", lambda p: np.pad(p, ((rim, rim), (rim, rim), (0, 0))))
+
+    def mirrored(self, texture) -> Texture:
+        """Four of it, mirrored at the lines between them."""
+
+        def mirrored(pixels):
+            wide = np.concatenate([pixels, pixels[:, ::-1]], axis=1)
+            return np.concatenate([wide, wide[::-1]], axis=0)
+
+        return self._made(texture, "mirrored", mirrored)
+
+    def _made(self, texture, how, make):
+        key = id(texture), how
+        if key not in self._textures:
+            self._textures[key] = Texture(texture.name, np.ascontiguousarray(make(texture.pixels)))
+        return self._textures[key]
+
     def of_meshes(self) -> Texture:
         """What stands for the colours of all meshes that have some."""
         if "meshes" not in self._textures:
@@ -40,6 +61,11 @@ class Images:
         if key not in self._textures:
             self._textures[key] = Texture(image.name, read())
         return self._textures[key]
+
+
+def rim_of(texture) -> int:
+    """Texels of black around one that is clipped: enough for some to be left where nodes shrink it."""
+    return 1 + max(texture.pixels.shape[:2]) // RIM
 
 
 def linear_pixels(image, warn) -> np.ndarray:

@@ -6,16 +6,18 @@ colour x strength has that radiance L (strength 3 bakes as 3.0 in Cycles, tested
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..core.scene import BRIGHTEST, Material
 from .colour_nodes import grey, read_colour_node
 from .mesh_colours import MeshColours
 from .private_render import ON_DIFFUSE_SURFACES, RenderError
-from .read_images import Images
+from .read_images import Images, mean_colour, rim_of
 from .read_mesh import BAKED_COLOURS
 from .render_colours import ShaderInput, rendered_means
-from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, surface_shader
+from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, output_input, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
 from .view_nodes import mean_over_view
@@ -23,7 +25,9 @@ from .view_nodes import mean_over_view
 NO_MATERIAL = Material("no material")
 EVERY_RAY = (True, True)  # shadow rays, and light that bounces
 
-DIFFUSE = {"BSDF_DIFFUSE": "Color", "SUBSURFACE_SCATTERING": "Color", "BSDF_TOON": "Color", "BSDF_SHEEN": "Color"}
+DIFFUSE = {"BSDF_DIFFUSE": "Color", "SUBSURFACE_SCATTERING": "Color", "BSDF_TOON": "Color"}
+# what white sheen reflects of light from all around, by roughness: as Cycles shows it in a white room
+SHEEN = (0.0, 0.1, 0.3, 0.5, 0.7, 1.0), (0.0, 0.003, 0.035, 0.118, 0.244, 0.447)
 GLOSSY = {
     "BSDF_GLOSSY": "Color",
     "BSDF_ANISOTROPIC": "Color",
@@ -45,6 +49,7 @@ class Materials:
     def __init__(self, depsgraph, warn):
         self.entries = [NO_MATERIAL]
         self.coordinates = [Coordinates()]
+        self.volumes = set()  # rows of those that have no surface
         self._indices, self._on_unseen = {}, {}
         self._guessed, self._sentences = [()], [()]  # of each entry; what was read of its images is not to stay
         self._depsgraph = depsgraph
@@ -68,6 +73,8 @@ class Materials:
         if key not in self._indices:
             reading = MaterialReading(material.evaluated_get(self._depsgraph), self._images)
             entry, coordinates = reading.material(), reading.coordinates()
+            if reading.is_volume:
+                self.volumes.add(len(self.entries))
             self._indices[key] = self._add(entry, coordinates, tuple(reading.guessed), reading.sentences())
         return self._indices[key]
 
@@ -144,6 +151,7 @@ class MaterialReading:
         self._notes = Notes()
         self._read = {}
         self._takes_mesh_colours = True
+        self.is_volume = False  # and no surface
 
     def material(self) -> Material:
         """The core material; never silently black."""
@@ -170,6 +178,7 @@ class MaterialReading:
             transmittance.texture,
             tuple(float(x) for x in translucence.value),
             translucence.texture,
+            textures_extend=getattr(self.coordinates(), "extends", False),
         )
 
     def coordinates(self) -> Coordinates | MeshColours:
@@ -188,11 +197,24 @@ class MaterialReading:
             return Surface(self._viewport_colour())
         try:
             shader = surface_shader(self.blender_material.node_tree)
-            return Surface() if shader is None else self._shader(shader)
+            self._say_what_is_not_baked()
+            self.is_volume = shader is None and self._has("Volume")
+            if shader is None:
+                return NOTHING if self.is_volume else Surface()
+            return self._shader(shader)
         except Unreadable as error:
             self._notes = Notes()
             self.say(f"its {error} cannot be read: the viewport colour is used")
             return Surface(self._viewport_colour())
+
+    def _has(self, output_name):
+        return output_input(self.blender_material.node_tree, output_name) is not None
+
+    def _say_what_is_not_baked(self):
+        if self._has("Volume"):
+            self.say("its volume is not baked: light passes as if there were none")
+        if self._has("Displacement") and self.blender_material.displacement_method != "BUMP":
+            self.say("its displacement is not baked")
 
     def _shader(self, reached: Reached) -> Surface:
         if reached.is_constant:
@@ -204,6 +226,9 @@ class MaterialReading:
             return Surface(radiance=self._emitted(reached, "Color", "Strength"))
         if kind in DIFFUSE:
             return Surface(self._colour(reached, DIFFUSE[kind]).within(1.0))
+        if kind == "BSDF_SHEEN":
+            colour = self._colour(reached, "Color").within(1.0)
+            return Surface(colour.scaled(np.interp(self._amount(reached, "Roughness").mean[0], *SHEEN)))
         if kind in GLOSSY:
             self.say(f"its {reached.node.bl_label} is baked as diffuse")
             return Surface(self._colour(reached, GLOSSY[kind]).within(1.0))
@@ -367,15 +392,30 @@ class MaterialReading:
         if reached.node.image is None:
             raise Unreadable("Image Texture node without an image")
         read = self._images.alpha if reached.socket.identifier == "Alpha" else self._images.texture
-        colour = Colour(np.ones(3), read(reached.node.image))
+        texture, node = read(reached.node.image), reached.node
         try:
-            if reached.node.projection != "FLAT":
-                raise Unreadable(f"{reached.node.projection.lower()} projection")
-            self._notes.coordinates[read_coordinates(follow(reached.node.inputs["Vector"], reached.groups))] = True
+            if node.projection != "FLAT":
+                raise Unreadable(f"{node.projection.lower()} projection")
+            coordinates = read_coordinates(follow(node.inputs["Vector"], reached.groups))
         except Unreadable as error:
-            self.say(f"its image '{reached.node.image.name}' uses {error}: the image's mean colour is used")
-            return Colour(colour.mean)
-        return colour
+            self.say(f"its image '{node.image.name}' uses {error}: the image's mean colour is used")
+            return Colour(np.array(mean_colour(texture.pixels)))
+        texture, coordinates = self._beyond_its_edges(node.extension, texture, coordinates)
+        self._notes.coordinates[coordinates] = True
+        return Colour(np.ones(3), texture)
+
+    def _beyond_its_edges(self, extension, texture, coordinates):
+        """A texture and its coordinates that repeat or extend, whatever the image does beyond its edges."""
+        if extension == "EXTEND":
+            return texture, replace(coordinates, extends=True)
+        if extension == "CLIP":
+            height, width = texture.pixels.shape[:2]
+            rim = rim_of(texture)
+            across, down = rim / (width + 2 * rim), rim / (height + 2 * rim)
+            return self._images.clipped(texture), coordinates.of_part((across, down), (1 - across, 1 - down), True)
+        if extension == "MIRROR":
+            return self._images.mirrored(texture), coordinates.of_part((0, 0), (0.5, 0.5), False)
+        return texture, coordinates
 
     def _viewport_colour(self) -> Colour:
         return Colour(np.clip(np.array(self.blender_material.diffuse_color[:3], float), 0.0, 1.0))

@@ -28,6 +28,7 @@ from .texture_coordinates import Coordinates
 from .visibility import Visibility, seen_by, warn_of_linking
 
 DEFAULTS = BakeSettings()
+UNSEEN = {"VOLUME": "a volume", "CURVES": "hair", "POINTCLOUD": "a point cloud"}
 
 
 class Warnings:
@@ -95,16 +96,22 @@ class SceneReading:
         """Append every mesh entry of the depsgraph that a render shows."""
         self._require_known()
         shared = SharedMeshes(self.depsgraph, self.settings)
-        entries = Counter()
+        entries, unseen = Counter(), {}
         # The iterator's objects are temporary: nothing of them is kept past its turn of the loop. Curves and their
         # like come twice, as themselves and as meshes; only the meshes are taken.
         for instance in self.depsgraph.object_instances:
-            if instance.object.type != "MESH" or instance.object.original.hide_render:
+            if instance.object.original.hide_render:
                 continue
             name = instance.object.name
+            if instance.object.type in UNSEEN and self.visibility.shows(instance):
+                unseen[name] = UNSEEN[instance.object.type]
+            if instance.object.type != "MESH":
+                continue
             number, entries[name] = entries[name], entries[name] + 1
             if self.visibility.shows(instance):
                 self._read_instance(instance, f"{name}#{number}" if instance.is_instance else name, shared)
+        for name in unseen.keys() - entries.keys():  # nodes may make meshes of them
+            self.warn(f"'{name}' is {unseen[name]}: the bake does not see it")
         self._spare_other_lightmaps(shared)
         self._require_targets()
 
@@ -164,12 +171,20 @@ class SceneReading:
             self.new_meshes.forget(name)
             return
         warn_of_linking(evaluated, self.warn)
+        for system in evaluated.particle_systems:
+            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+                self.warn(f"'{name}' has hair, '{system.name}': the bake does not see it")
         for attribute, values in arrays.colours.items():
             if values.max(initial=0.0) > 1:
                 self.warn(f"'{name}': colours of its attribute '{attribute}' above 1 are read as 1")
         for attribute in arrays.unread_colours:
             self.warn(f"'{name}': its attribute '{attribute or 'of render colours'}' cannot be read: it is black")
         materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
+        if self.materials.volumes.issuperset(materials.tolist()):
+            if target_mesh:
+                self._refuse(name, f"'{name}' has a volume and no surface: it is not baked")
+                self.new_meshes.forget(name)
+            return
         placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
         if target_mesh and self.settings.keep_uvs and placed.lightmap_uvs is not None:
             in_rect = in_lightmap(placed.lightmap_uvs, rect_of(evaluated.original)).astype(np.float32)
@@ -180,6 +195,8 @@ class SceneReading:
 
     def _slot_materials(self, evaluated, mesh, is_seen_by):
         """Rows of ``materials`` by material slot, int32 (slots or 1,)."""
+        if self.view_layer.material_override is not None:
+            return np.array([self.materials.index_of(self.view_layer.material_override, is_seen_by)], np.int32)
         materials = list(mesh.materials)
         for index, slot in enumerate(evaluated.material_slots):
             if index >= len(materials):

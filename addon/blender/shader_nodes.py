@@ -56,11 +56,16 @@ def follow(socket, groups=()) -> Reached:
 
 def surface_shader(node_tree, output_type="OUTPUT_MATERIAL") -> Reached | None:
     """The shader that Cycles renders, or None where nothing is linked to the Surface."""
+    return output_input(node_tree, "Surface", output_type)
+
+
+def output_input(node_tree, name, output_type="OUTPUT_MATERIAL") -> Reached | None:
+    """What is linked to an input of the output that Cycles renders, or None where nothing is."""
     outputs = [node for node in node_tree.nodes if node.type == output_type and node.target in {"ALL", "CYCLES"}]
     output = next((node for node in outputs if node.is_active_output), outputs[0] if outputs else None)
     if output is None:
         return None
-    reached = follow(output.inputs["Surface"])
+    reached = follow(output.inputs[name])
     return None if reached.is_constant else reached
 
 

@@ -14,10 +14,17 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class Coordinates:
-    """The UV layer ("" = the mesh's render layer) and the affine map after it, the rows of a 2 x 3 matrix."""
+    """The UV layer ("" = the mesh's render layer), the affine map after it, the rows of a 2 x 3 matrix, and whether the
+    image goes on beyond 0 ... 1 as at its edges."""
 
     uv_layer: str = ""
     affine: tuple[float, ...] = IDENTITY
+    extends: bool = False
+
+    def of_part(self, low, high, extends) -> Coordinates:
+        """Of an image that has this one from ``low`` to ``high`` of its sides, (2,) each."""
+        low, high = np.array(low, float), np.array(high, float)
+        return Coordinates(self.uv_layer, _after(np.column_stack([np.diag(high - low), low]), self.affine), extends)
 
     def uvs_of(self, mesh, chosen) -> np.ndarray:
         """UVs of chosen triangles (K,) of read_mesh.MeshArrays, float32 (K, 3, 2); 0 where it has no such layer."""

@@ -21,7 +21,7 @@ except ImportError as error:  # a source tree that has not been built, or a zip 
 
 ROWS = 16  # of a lightmap are smoothed at once, where neighbours are a texel apart
 NO_OWNERS = np.zeros(0, np.int32)  # of pieces: each is a patch
-RAYS_STOP, RAYS_MISS, SHADOWS_MISS = 1, 2, 4  # pl_clear_rays
+RAYS_STOP, RAYS_MISS, SHADOWS_MISS, MAP_EXTENDS = 1, 2, 4, 8  # pl_clear_flags
 GUIDE_CELLS = 64  # PL_GUIDE_CELLS of native/include/patchlight.h
 
 LIBRARY_PATTERNS = {
@@ -214,7 +214,7 @@ def _clear(scene: Scene):
     ends = np.cumsum(shapes.prod(axis=1))
     return (
         np.array([m.transmittance for m in scene.materials], np.float32)[scene.triangle_materials],
-        np.array([_clear_rays(m) for m in scene.materials], np.uint8)[scene.triangle_materials],
+        np.array([_clear_flags(m) for m in scene.materials], np.uint8)[scene.triangle_materials],
         maps[scene.triangle_materials],
         scene.uvs.reshape(-1, 6),
         np.column_stack([ends - shapes.prod(axis=1), shapes]).astype(np.int32),
@@ -222,13 +222,15 @@ def _clear(scene: Scene):
     )
 
 
-def _clear_rays(material):
-    """A sum of pl_clear_rays."""
-    return (
-        RAYS_STOP * material.stops_light
-        + RAYS_MISS * (not material.meets_light)
-        + (SHADOWS_MISS * (not material.meets_shadow_rays))
-    )
+def _clear_flags(material):
+    """A sum of pl_clear_flags."""
+    flags = {
+        RAYS_STOP: material.stops_light,
+        RAYS_MISS: not material.meets_light,
+        SHADOWS_MISS: not material.meets_shadow_rays,
+        MAP_EXTENDS: material.textures_extend,
+    }
+    return sum(flag for flag, is_set in flags.items() if is_set)
 
 
 def smooth(workers, grid, receivers, values, variances, step, stops_on_value):

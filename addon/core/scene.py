@@ -37,7 +37,7 @@ def radiance_from_exitance(exitance):
 
 @dataclass(frozen=True, slots=True)
 class Texture:
-    """An image looked up bilinearly at UVs that repeat; row 0 is v = 0.
+    """An image looked up bilinearly at UVs; row 0 is v = 0.
 
     Attributes
     ----------
@@ -72,6 +72,7 @@ class Material:
     translucence : (3,) diffuse transmittance [0..1] for the light that meets it, which leaves at the other side: no
         more than is not reflected; multiplies the texture where there is one
     translucence_texture : Texture or None
+    textures_extend : whether its textures go on beyond UVs of 0 to 1 as at their edges; False = they repeat
     meets_shadow_rays : whether it hides lights; False = they shine through it
     meets_light : whether light that bounces meets it; False = it passes, and nobody sees the surface, which must not
         emit nor scatter light
@@ -86,6 +87,7 @@ class Material:
     transmittance_texture: Texture | None = None
     translucence: tuple[float, float, float] = (0.0, 0.0, 0.0)
     translucence_texture: Texture | None = None
+    textures_extend: bool = False
     meets_shadow_rays: bool = True
     meets_light: bool = True
 
@@ -111,6 +113,12 @@ class Material:
         most = ((1 - passing.mean()) * scattered + passing).max()
         if most > 1 + 1e-6:
             raise SceneError(f"material {self.name} sends on {most:.4g} times the light that it gets in a channel")
+
+    @property
+    def is_nothing(self) -> bool:
+        """Whether all light passes as if it were not there."""
+        passes_all = self.transmittance_texture is None and min(self.transmittance) == 1
+        return passes_all and max(*self.reflectance, *self.radiance, *self.translucence) == 0
 
     @property
     def transmits(self) -> bool:

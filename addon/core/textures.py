@@ -9,18 +9,28 @@ from .scene import Scene, Texture
 BLOCK = 1 << 16  # points that are looked up at once
 
 
-def lookup(texture: Texture, uvs):
-    """Bilinear, repeating lookup at uvs (N, 2): float32 (N, 3). Row 0 of the pixels is at v = 0."""
+def lookup(texture: Texture, uvs, extends=False):
+    """Bilinear lookup at uvs (N, 2): float32 (N, 3). Row 0 of the pixels is at v = 0.
+
+    Beyond 0 ... 1 the texture repeats, or ``extends``: goes on as at its edges.
+    """
     height, width = texture.pixels.shape[:2]
-    x = uvs[:, 0].astype(np.float64) % 1.0 * width - 0.5
-    y = uvs[:, 1].astype(np.float64) % 1.0 * height - 0.5
-    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    right, up = (x - column)[:, None], (y - row)[:, None]
-    left_column, right_column = column % width, (column + 1) % width
-    low_row, high_row = row % height, (row + 1) % height
+    left_column, right_column, right = _texels_along(uvs[:, 0], width, extends)
+    low_row, high_row, up = _texels_along(uvs[:, 1], height, extends)
     low = texture.pixels[low_row, left_column] * (1 - right) + texture.pixels[low_row, right_column] * right
     high = texture.pixels[high_row, left_column] * (1 - right) + texture.pixels[high_row, right_column] * right
     return (low * (1 - up) + high * up).astype(np.float32)
+
+
+def _texels_along(coordinates, size, extends):
+    """The two texels about coordinates (N,) along a side, and the share (N, 1) of the second."""
+    coordinates = coordinates.astype(np.float64)
+    places = (np.clip(coordinates, 0, 1) if extends else coordinates % 1.0) * size - 0.5
+    first = np.floor(places).astype(np.int64)
+    share = (places - first)[:, None]
+    if extends:
+        return np.clip(first, 0, size - 1), np.clip(first + 1, 0, size - 1), share
+    return first % size, (first + 1) % size, share
 
 
 def scattered_shares(scene: Scene, triangles, barycentrics):
@@ -45,5 +55,5 @@ def textured_colours(scene: Scene, triangles, barycentrics, factor: str):
         at = np.flatnonzero(materials == index)
         for part in np.array_split(at, len(at) // BLOCK + 1):
             uvs = np.einsum("nk,nkc->nc", barycentrics[part], scene.uvs[triangles[part]])
-            colours[part] *= lookup(image, uvs)
+            colours[part] *= lookup(image, uvs, material.textures_extend)
     return colours

@@ -47,21 +47,22 @@ void pl_embree_close(pl_embree *embree);
  * What passes straight through triangles.
  *
  *   transmittance  3 * triangle_count floats, 0 .. 1: the share of light that passes; a triangle with none is opaque
- *   rays           triangle_count sums of pl_clear_rays: what kinds of rays do with what does not pass. A ray is
- * stopped by chance, by the mean of the three shares maps           triangle_count: which map multiplies the shares, -1
- * for none uvs            6 * triangle_count: where the corners lie in it, from 0 to 1 along a side; it repeats. Not
- * touched, and NULL if you like, where there are no maps map_shapes     3 * map_count: first pixel, height, width. A
- * map is looked up bilinearly, its row 0 at v = 0 pixels         3 * pixel_count floats, 0 .. 1
+ *   flags          triangle_count sums of pl_clear_flags. A ray is stopped by chance, by the mean of the three shares
+ *   maps           triangle_count: which map multiplies the shares, -1 for none
+ *   uvs            6 * triangle_count: where the corners lie in it, from 0 to 1 along a side; it repeats, or goes on as
+ *                  at its edges. Not touched, and NULL if you like, where there are no maps
+ *   map_shapes     3 * map_count: first pixel, height, width. A map is looked up bilinearly, its row 0 at v = 0
+ *   pixels         3 * pixel_count floats, 0 .. 1
  */
-typedef enum pl_clear_rays {
-    PL_RAYS_STOP = 1,   /* scattered rays meet what does not pass, and then see the triangle; else that is lost, as in
-                           glass */
-    PL_RAYS_MISS = 2,   /* scattered rays pass as if it were not there */
-    PL_SHADOWS_MISS = 4 /* shadow rays do */
-} pl_clear_rays;
+typedef enum pl_clear_flags {
+    PL_RAYS_STOP = 1, /* scattered rays meet what does not pass, and see the triangle; else that is lost, as in glass */
+    PL_RAYS_MISS = 2, /* scattered rays pass as if it were not there */
+    PL_SHADOWS_MISS = 4, /* shadow rays do */
+    PL_MAP_EXTENDS = 8   /* beyond 0 .. 1 its map is as at the edges */
+} pl_clear_flags;
 typedef struct pl_clear {
     const float *transmittance;
-    const uint8_t *rays;
+    const uint8_t *flags;
     const int32_t *maps;
     const float *uvs;
     const int32_t *map_shapes;

@@ -39,7 +39,7 @@ static PyObject *create_scene(PyObject *self, PyObject *args) {
     door_array arrays[] = {{"vertices", 'd', 3, -1, false, {0}},
                            {"triangles", 'i', 3, -1, false, {0}},
                            {"transmittance", 'f', 3, AS_MANY_ROWS_AS(1), false, {0}},
-                           {"rays", 'B', 1, AS_MANY_ROWS_AS(1), false, {0}},
+                           {"flags", 'B', 1, AS_MANY_ROWS_AS(1), false, {0}},
                            {"maps", 'i', 1, AS_MANY_ROWS_AS(1), false, {0}},
                            {"uvs", 'f', 6, AS_MANY_ROWS_AS(1), false, {0}},
                            {"map_shapes", 'i', 3, -1, false, {0}},
@@ -171,7 +171,7 @@ static PyObject *pack_charts(PyObject *self, PyObject *args) {
 static PyMethodDef methods[] = {
     {"open_embree", open_embree, METH_VARARGS, "open_embree(path) -> embree"},
     {"create_scene", create_scene, METH_VARARGS,
-     "create_scene(embree, vertices, triangles, (transmittance, rays, maps, uvs, map_shapes, pixels) or None) -> "
+     "create_scene(embree, vertices, triangles, (transmittance, flags, maps, uvs, map_shapes, pixels) or None) -> "
      "scene"},
     {"scene_centre", scene_centre, METH_O, "scene_centre(scene) -> (x, y, z)"},
     {"closest_hits", closest_hits, METH_VARARGS, "closest_hits(scene, origins, directions, out_triangles, out_hits)"},

@@ -25,7 +25,7 @@ pl_status clear_copy(const pl_clear *from, size_t triangle_count, pl_clear *out_
     if (!maps_are_valid(from, triangle_count))
         return PL_ERR_ARGUMENT;
     *out_clear = (pl_clear){.transmittance = copy_of(from->transmittance, 3 * sizeof(float) * triangle_count),
-                            .rays = copy_of(from->rays, triangle_count),
+                            .flags = copy_of(from->flags, triangle_count),
                             .maps = copy_of(from->maps, sizeof(int32_t) * triangle_count),
                             /* without a map nothing is looked up, and three million triangles have 72 MB of these */
                             .uvs = copy_of(from->uvs, from->map_count ? 6 * sizeof(float) * triangle_count : 0),
@@ -33,35 +33,42 @@ pl_status clear_copy(const pl_clear *from, size_t triangle_count, pl_clear *out_
                             .map_count = from->map_count,
                             .pixels = copy_of(from->pixels, 3 * sizeof(float) * from->pixel_count),
                             .pixel_count = from->pixel_count};
-    const bool is_complete = out_clear->transmittance && out_clear->rays && out_clear->maps && out_clear->uvs &&
+    const bool is_complete = out_clear->transmittance && out_clear->flags && out_clear->maps && out_clear->uvs &&
                              out_clear->map_shapes && out_clear->pixels;
     return is_complete ? PL_OK : PL_ERR_MEMORY;
 }
 
 void clear_destroy(pl_clear *clear) {
-    const void *const copies[] = {clear->transmittance, clear->rays,       clear->maps,
+    const void *const copies[] = {clear->transmittance, clear->flags,      clear->maps,
                                   clear->uvs,           clear->map_shapes, clear->pixels};
     for (size_t k = 0; k < sizeof copies / sizeof *copies; ++k)
         free((void *)copies[k]);
 }
 
-/* A place along a side of a map that repeats, from -0.5 at its begin to size - 0.5; 0 of what is not a number. */
-static float place_along(float coordinate, int32_t size) {
-    const float repeated = coordinate - floorf(coordinate);
-    return (repeated >= 0 && repeated <= 1 ? repeated : 0) * (float)size - 0.5f;
+/* A place along a side of a map, from -0.5 at its begin to size - 0.5; 0 of what is not a number. */
+static float place_along(float coordinate, int32_t size, bool extends) {
+    const float within = extends ? lesser(greater(coordinate, 0), 1) : coordinate - floorf(coordinate);
+    return (within >= 0 && within <= 1 ? within : 0) * (float)size - 0.5f;
+}
+
+/* The texel of a row's or a column's number, which may be one beyond the map. */
+static size_t texel_along(int32_t number, int32_t size, bool extends) {
+    if (extends)
+        return (size_t)(number < 0 ? 0 : number < size ? number : size - 1);
+    return (size_t)((number + size) % size);
 }
 
 /* Multiply io_rgb by a map, bilinearly. */
-static void multiply_by_map(const pl_clear *clear, int32_t map, float u, float v, float io_rgb[3]) {
+static void multiply_by_map(const pl_clear *clear, int32_t map, bool extends, float u, float v, float io_rgb[3]) {
     const int32_t height = clear->map_shapes[3 * map + 1], width = clear->map_shapes[3 * map + 2];
     const float *pixels = clear->pixels + 3 * (size_t)clear->map_shapes[3 * map];
-    const float x = place_along(u, width), y = place_along(v, height);
+    const float x = place_along(u, width, extends), y = place_along(v, height, extends);
     const float right = x - floorf(x), up = y - floorf(y);
     const int32_t column = (int32_t)floorf(x), row = (int32_t)floorf(y);
     float sum[3] = {0, 0, 0};
     for (int corner = 0; corner < 4; ++corner) {
         const int is_right = corner & 1, is_up = corner >> 1;
-        const size_t c = (size_t)((column + is_right + width) % width), r = (size_t)((row + is_up + height) % height);
+        const size_t c = texel_along(column + is_right, width, extends), r = texel_along(row + is_up, height, extends);
         const float weight = (is_right ? right : 1 - right) * (is_up ? up : 1 - up);
         for (size_t k = 0; k < 3; ++k)
             sum[k] += weight * pixels[3 * (r * (size_t)width + c) + k];
@@ -80,7 +87,7 @@ static void transmittance_at(const pl_clear *clear, const pl_hit *hit, float out
     const float *uv = clear->uvs + 6 * triangle;
     const float u = uv[0] + hit->u * (uv[2] - uv[0]) + hit->v * (uv[4] - uv[0]);
     const float v = uv[1] + hit->u * (uv[3] - uv[1]) + hit->v * (uv[5] - uv[1]);
-    multiply_by_map(clear, clear->maps[triangle], u, v, out_rgb);
+    multiply_by_map(clear, clear->maps[triangle], clear->flags[triangle] & PL_MAP_EXTENDS, u, v, out_rgb);
 }
 
 /* A number of [0, 1) that hangs on nothing but where a ray hits. */
@@ -101,7 +108,7 @@ bool transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, flo
         if (hit.triangle < 0)
             break;
         near = nextafterf(hit.distance, INFINITY);
-        if (scene->clear.rays[hit.triangle] & PL_SHADOWS_MISS)
+        if (scene->clear.flags[hit.triangle] & PL_SHADOWS_MISS)
             continue;
         float through[3];
         transmittance_at(&scene->clear, &hit, through);
@@ -121,11 +128,11 @@ pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_r
         if (hit.triangle < 0)
             break;
         near = nextafterf(hit.distance, INFINITY);
-        if (scene->clear.rays[hit.triangle] & PL_RAYS_MISS)
+        if (scene->clear.flags[hit.triangle] & PL_RAYS_MISS)
             continue;
         float through[3], passing = 1;
         transmittance_at(&scene->clear, &hit, through);
-        if (scene->clear.rays[hit.triangle] & PL_RAYS_STOP) {
+        if (scene->clear.flags[hit.triangle] & PL_RAYS_STOP) {
             /* exact for grey: nothing is lost then */
             passing = through[1] + ((through[0] - through[1]) + (through[2] - through[1])) / 3;
             if (number_of(&hit) >= passing)

@@ -8,7 +8,7 @@ static bool is_clear(const pl_scene *scene, size_t triangle) {
     if (!scene->clear.transmittance)
         return false;
     const float *t = scene->clear.transmittance + 3 * triangle;
-    return t[0] > 0 || t[1] > 0 || t[2] > 0 || scene->clear.rays[triangle] & (PL_RAYS_MISS | PL_SHADOWS_MISS);
+    return t[0] > 0 || t[1] > 0 || t[2] > 0 || scene->clear.flags[triangle] & (PL_RAYS_MISS | PL_SHADOWS_MISS);
 }
 
 static void recentre(pl_scene *scene, const double *vertices) {

@@ -191,7 +191,46 @@ def fittings(add_mesh, nodes):
         tree.links.new(output, next(n for n in tree.nodes if n.type == "EMISSION").inputs["Strength"])
 
 
-@pytest.mark.parametrize("furnish", [curtain, leaves, lampshade, screen, tiles, painted, unseen, modified, fittings])
+def edges(add_mesh, nodes):
+    """Images that do not repeat, each three times over a board; of one the alpha cuts it out."""
+    for k, (extension, what) in enumerate(
+        (("CLIP", "Color"), ("EXTEND", "Color"), ("MIRROR", "Color"), ("CLIP", "Alpha"))
+    ):
+        material, tree = nodes(extension)
+        image, mapping = tree.new("TexImage"), tree.new("Mapping", Scale=(3, 3, 3), Location=(-0.5, -0.5, 0))
+        image.image, image.extension = blobs(), extension
+        image.image.pixels[: 4 * 64 * 20] = [1.0] * (4 * 64 * 20)  # what lies beyond its sides is not all the same
+        tree.link(tree.link(tree.new("UVMap"), mapping, 0, "Vector"), image, 0, "Vector")
+        diffuse = tree.new("BsdfDiffuse", Color=(0.8, 0.6, 0.4, 1))
+        if what == "Color":
+            tree.show(tree.link(image, diffuse, "Color", "Color"))
+        else:
+            mix = tree.link(image, tree.new("MixShader"), "Alpha", 0)
+            tree.link(tree.new("BsdfTransparent"), mix, 0, 1)
+            tree.show(tree.link(diffuse, mix, 0, 2))
+        quad(add_mesh, extension, (0.2 + k % 2 * 1.9, 0.2 + k // 2 * 1.9, 0.8), (1.7, 0, 0), (0, 1.7, 0), material)
+    lamp((2, 1.9, 2.6))
+
+
+def velvet(add_mesh, nodes):
+    """Sheen over a wall, a box of fog, and a sum of shaders on the floor."""
+    material, tree = nodes("velvet")
+    tree.show(tree.new("BsdfSheen", Color=(0.9, 0.8, 0.7, 1), Roughness=0.6))
+    quad(add_mesh, "curtain", (0.05, 3.95, 0.05), (3.9, 0, 0), (0, 0, 2.9), material)
+    material, tree = nodes("fog")
+    tree.tree.links.new(tree.new("VolumeScatter", Density=1e-4).outputs[0], tree.new("OutputMaterial").inputs["Volume"])
+    quad(add_mesh, "fog", (-1, -1, 1.5), (6, 0, 0), (0, 6, 0), material)
+    material, tree = nodes("sum")
+    added = tree.link(tree.new("BsdfDiffuse", Color=(0.4, 0.2, 0.1, 1)), tree.new("AddShader"), 0, 0)
+    tree.show(tree.link(tree.new("BsdfDiffuse", Color=(0.1, 0.2, 0.3, 1)), added, 0, 1))
+    quad(add_mesh, "carpet", (0.1, 0.1, 0.02), (3.8, 0, 0), (0, 3.7, 0), material)
+    lamp((2, 1.5, 2))
+
+
+ROOMS = [curtain, leaves, lampshade, screen, tiles, painted, unseen, modified, fittings, edges, velvet]
+
+
+@pytest.mark.parametrize("furnish", ROOMS)
 def test_every_panel_has_the_light_that_cycles_gives_it(room, add_mesh, nodes, furnish):
     furnish(add_mesh, nodes)
     ours, cycles = our_light(room), cycles_light(room)

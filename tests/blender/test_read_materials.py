@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from addon.blender.read_scene import read_scene
+from addon.core.scene import SceneError
 
 pytestmark = pytest.mark.usefixtures("empty_file")
 
@@ -349,3 +350,38 @@ def test_a_large_image_is_shrunk_without_changing_its_mean(nodes, read, add_imag
     assert texture.shape == (1, 1366, 3)
     # 4100 = 3 x 1366 + 2 columns: at most the last two and the fourth row are left out
     np.testing.assert_allclose(texture.mean(axis=(0, 1)), pixels[:3, :4098].mean(axis=(0, 1)), rtol=1e-5)
+
+
+def test_a_volume_alone_lets_all_light_pass_and_is_not_baked(nodes, add_cube):
+    material, tree = nodes("fog")
+    tree.tree.links.new(tree.new("VolumeScatter").outputs[0], tree.new("OutputMaterial").inputs["Volume"])
+    add_cube("Fog", material)
+    add_cube("Room")
+    scene = read_scene(bpy.context.scene)
+    assert [o.name for o in scene.objects] == ["Room"]
+    assert "'Fog' has a volume and no surface: it is not baked" in scene.warnings
+    with pytest.raises(SceneError, match="'Fog' has a volume and no surface"):
+        read_scene(bpy.context.scene, object_names=["Fog"])
+
+
+def test_a_volume_and_displacement_of_a_surface_are_told(nodes, read):
+    material, tree = nodes("stuff")
+    output = tree.link(tree.new("BsdfDiffuse"), tree.new("OutputMaterial"), 0, "Surface")
+    for kind, name in (("VolumeScatter", "Volume"), ("Displacement", "Displacement")):
+        tree.tree.links.new(tree.new(kind).outputs[0], output.inputs[name])
+    material.displacement_method = "BUMP"
+    _, warnings = read(material)
+    assert warnings == ("material 'stuff': its volume is not baked: light passes as if there were none",)
+    material.displacement_method = "DISPLACEMENT"
+    _, warnings = read(material)
+    assert "material 'stuff': its displacement is not baked" in warnings
+
+
+def test_a_material_override_takes_the_place_of_all(nodes, add_cube):
+    clay, tree = nodes("clay")
+    tree.show(tree.new("BsdfDiffuse", Color=(0.4, 0.4, 0.4, 1)))
+    add_cube(material=nodes("own")[0])
+    bpy.context.view_layer.material_override = clay
+    scene = read_scene(bpy.context.scene)
+    (used,) = np.unique(scene.triangle_materials)
+    assert scene.materials[used].name == "clay"

@@ -388,3 +388,17 @@ def test_instances_are_seen_as_far_as_what_makes_them(add_cube):
     scene = read()
     (chair,) = (o for o in scene.objects if o.name.startswith("Chair"))
     assert not scene.materials[scene.triangle_materials[chair.first]].meets_shadow_rays
+
+
+def test_what_light_meets_in_a_render_only_is_told(add_cube):
+    add_cube("Room")
+    carpet = add_cube("Carpet")
+    carpet.modifiers.new("Pile", "PARTICLE_SYSTEM")
+    carpet.particle_systems[0].settings.type = "HAIR"
+    for name, data in (("Smoke", bpy.data.volumes.new("Smoke")), ("Fur", bpy.data.hair_curves.new("Fur"))):
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, data))
+    assert set(read().warnings) == {
+        "'Carpet' has hair, 'Pile': the bake does not see it",
+        "'Smoke' is a volume: the bake does not see it",
+        "'Fur' is hair: the bake does not see it",
+    }

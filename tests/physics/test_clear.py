@@ -37,11 +37,13 @@ def room(sheet, radiance=0.0):
     return with_uvs(scene, "sheet", UV_SQUARE)
 
 
-def test_direct_light_through_an_image_is_what_the_image_says():
-    """A lamp 2 m up, a sheet 1 m up with an image of noise, repeated: each point sees one point of it."""
+@pytest.mark.parametrize("extends", [False, True], ids=["repeats", "extends"])
+def test_direct_light_through_an_image_is_what_the_image_says(extends):
+    """A lamp 2 m up, a sheet 1 m up with an image of noise several times over it: each point sees one point of it."""
     rng = np.random.default_rng(3)
     noise = Texture("noise", rng.uniform(0, 1, (7, 5, 3)).astype(np.float32))
-    material = Material("sheet", transmittance=(0.8, 0.5, 1.0), transmittance_texture=noise)
+    tint = (0.8, 0.5, 1.0)
+    material = Material("sheet", transmittance=tint, transmittance_texture=noise, textures_extend=extends)
     sheet = rectangle((-4, -4, 1), (8, 0, 0), (0, 8, 0), material=material, name="sheet")
     points, lamp = random_points(400, rng), PointLight("lamp", (0.0, 0.0, 2.0), (3.0, 2.0, 1.0))
     uvs = 3.7 * UV_SQUARE - np.float32([1.3, 0.4])
@@ -49,7 +51,7 @@ def test_direct_light_through_an_image_is_what_the_image_says():
     with kernel_of(scene) as kernel:
         found, _, _ = kernel.direct(emitters_of(scene, kernel.centre), floor_receivers(points), 64, 0)
     crossed = 3.7 * (0.5 * points[:, :2] + 4) / 8 - [1.3, 0.4]
-    expected = direct_light([lamp], points)[0] * lookup(noise, crossed) * (0.8, 0.5, 1.0)
+    expected = direct_light([lamp], points)[0] * lookup(noise, crossed, extends) * tint
     # a texel of the image is a fifth of 8 / 3.7 m, float32 places on it are good to 1e-6 of that times their size
     assert found == pytest.approx(expected, rel=SINGLE, abs=2e-5)
 
