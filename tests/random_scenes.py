@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from addon.core.environment import Environment
-from addon.core.scene import AreaLight, Material, PointLight, Scene, SceneObject, SunLight, Texture
+from addon.core.scene import AreaLight, Back, Material, PointLight, Scene, SceneObject, SunLight, Texture
 
 # lengths at which something breaks: denormal, lost in float32, a hair, a room, a planet, lost in float64, none at all
 SMALL = (0.0, -0.0, 5e-324, 1e-30, -1e-30, 1e-7, -1e-3)
@@ -125,6 +125,10 @@ def materials(draw):
     dimmed = np.minimum(1, most / np.maximum(reflected + through, 1e-9)).min()
     reflected, through = (tuple(float(x) for x in dimmed * np.array(part)) for part in (reflected, through))
     made = Material("stuff", reflected, tint, glow, shown, clear, cut_out, through, mask)
+    if not made.is_translucent:
+        other = Back(draw(colour), draw(image), draw(brightness))
+        side = {"open_side": draw(st.sampled_from(("front", "back"))), "back": draw(st.sampled_from((None, other)))}
+        made = replace(made, **draw(st.sampled_from(({}, {}, {}, {"back": other}, side))))
     seen_by = draw(st.sampled_from(((True, True),) * 5 + ((True, False), (False, True), (False, False))))
     return made if all(seen_by) else made.seen_by(*seen_by)
 

@@ -20,6 +20,7 @@ from .render_colours import ShaderInput, rendered_means
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, output_input, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
+from .two_sides import two_sided
 from .view_nodes import mean_over_view
 
 NO_MATERIAL = Material("no material")
@@ -143,7 +144,7 @@ class MaterialReading:
     ``told`` are the mean colours of shaders' inputs that need not be guessed, ``guessed`` those inputs that were.
     """
 
-    def __init__(self, blender_material, images, told=None):
+    def __init__(self, blender_material, images, told=None, is_back=False):
         self.blender_material = blender_material
         self.guessed: dict[ShaderInput, bool] = {}
         self._told = told or {}
@@ -152,9 +153,20 @@ class MaterialReading:
         self._read = {}
         self._takes_mesh_colours = True
         self.is_volume = False  # and no surface
+        self._is_back, self._asks_for_side = is_back, False
 
     def material(self) -> Material:
         """The core material; never silently black."""
+        front = self._one_side()
+        if not self._asks_for_side:
+            return front
+        reading = MaterialReading(self.blender_material, self._images, self._told, is_back=True)
+        back = reading._one_side()
+        self.guessed |= reading.guessed
+        self._notes.add(reading._notes)
+        return two_sided(front, back, self.say)
+
+    def _one_side(self) -> Material:
         surface = self._surface()
         if len(self._notes.coordinates) > 1 and any(isinstance(kind, MeshColours) for kind in self._notes.coordinates):
             # a triangle has one place in textures: its image's
@@ -367,6 +379,9 @@ class MaterialReading:
             return Colour(constant_colour(reached))
         if reached.node.type == "LIGHT_PATH" and reached.socket.name in KINDS_OF_RAYS:
             return Colour(np.full(3, ON_DIFFUSE_SURFACES.get(reached.socket.name, 0.0)))
+        if reached.node.type == "NEW_GEOMETRY" and reached.socket.identifier == "Backfacing":
+            self._asks_for_side = True
+            return Colour(np.full(3, float(self._is_back)))
         if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
         if reached.node.type in SEEN_BY_ANGLE:

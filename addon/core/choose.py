@@ -29,7 +29,8 @@ def choose(
     """Solver, method, and a sentence on why, after "auto" has looked at the scene's size and mean reflectance.
 
     ``side_count`` are the sides of the patches that conjugate gradients would start with: thin triangles have many.
-    ``needs_rays`` names a material that lets light through in a colour, or diffusely: form factors know neither.
+    ``needs_rays`` names a material that lets light through in a colour, diffusely or on one side: form factors know
+    none of these.
 
     By time to equal error, measured on closed cubes and the Cornell box of 240 to 12000 sides: rows of form factors and
     conjugate gradients take a third to a tenth of stochastic Jacobi's time at reflectance 0.9, a hundredth at 0.99, up
@@ -54,7 +55,7 @@ def choose(
 
 
 def _choose_rays(settings, material):
-    why = f"material '{material}' lets light through diffusely or in a colour"
+    why = f"material '{material}' lets light through diffusely, in a colour or on one side"
     for name, value, others in (
         ("solver", settings.solver, ("auto", "stochastic")),
         ("method", settings.method, ("auto", "monte-carlo")),

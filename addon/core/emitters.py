@@ -61,7 +61,7 @@ def emitters_of(scene: Scene, centre) -> Emitters:
         profiles=_profiles([scene.lights[row].profile for row in shaped]),
     )
     corners, radiances = _glowing_triangles(scene)
-    return with_sources(lamps, corners, np.concatenate([radiances, radiances], axis=1), centre)
+    return with_sources(lamps, corners, radiances, centre)
 
 
 def with_sources(emitters: Emitters, corners, radiances, centre) -> Emitters:
@@ -114,9 +114,10 @@ def _light_row(light, centre):
 
 
 def _glowing_triangles(scene):
-    """World corners float64 (N, 3, 3) and radiance (N, 3) of all triangles that emit."""
+    """World corners float64 (N, 3, 3) and radiance of front and back (N, 6) of all triangles that emit."""
     emits = np.array([m.emits for m in scene.materials], bool)
-    is_image = np.array([m.radiance_texture is not None for m in scene.materials], bool)
+    images = [[side.radiance_texture for side in (m, m.of_back)] for m in scene.materials]
+    is_image = np.array([any(image is not None for image in both) for both in images], bool)
     cut = np.flatnonzero((emits & is_image)[scene.triangle_materials])
     # at one place of its image a triangle has one colour
     cut = cut[(scene.uvs[cut] != scene.uvs[cut, :1]).any(axis=(1, 2))]
@@ -126,18 +127,28 @@ def _glowing_triangles(scene):
     pieces = np.einsum("pkb,tbc->tpkc", weights, scene.corners[cut]).reshape(-1, 3, 3)
     middles = np.full((len(plain), 3), 1 / 3, np.float32)
     corners = np.concatenate([scene.corners[plain], pieces])
-    of_plain = textured_colours(scene, plain, middles, "radiance")
-    radiances = np.concatenate([of_plain, _glow_of_pieces(scene, cut, weights)])
+    has_backs = any(m.back is not None for m in scene.materials)
+    sides = [
+        np.concatenate(
+            [
+                textured_colours(scene, plain, middles, "radiance", of_back),
+                _glow_of_pieces(scene, cut, weights, of_back),
+            ]
+        )
+        for of_back in ([False, True] if has_backs else [False])
+    ]
+    radiances = np.concatenate([sides[0], sides[-1]], axis=1)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     keep = (areas > 0) & (radiances.max(axis=1, initial=0.0) > 0) & _is_first(corners)
     return corners[keep], radiances[keep]
 
 
-def _glow_of_pieces(scene, triangles, weights):
+def _glow_of_pieces(scene, triangles, weights, of_back):
     """Mean radiance (T * P, 3) of pieces of triangles (T,), of corner weights (P, 3, 3): at many points of each."""
     finer = int(np.clip((TEXTURE_LOOKUPS / max(len(triangles) * len(weights), 1)) ** 0.5, 1, MOST_FINER))
     points = np.einsum("sk,pkb->psb", _cuts(finer).mean(axis=1), weights).reshape(-1, 3).astype(np.float32)
-    glow = textured_colours(scene, np.repeat(triangles, len(points)), np.tile(points, (len(triangles), 1)), "radiance")
+    where = np.repeat(triangles, len(points)), np.tile(points, (len(triangles), 1))
+    glow = textured_colours(scene, *where, "radiance", of_back)
     return glow.reshape(-1, finer**2, 3).mean(axis=1)
 
 

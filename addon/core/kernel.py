@@ -21,7 +21,7 @@ except ImportError as error:  # a source tree that has not been built, or a zip 
 
 ROWS = 16  # of a lightmap are smoothed at once, where neighbours are a texel apart
 NO_OWNERS = np.zeros(0, np.int32)  # of pieces: each is a patch
-RAYS_STOP, RAYS_MISS, SHADOWS_MISS, MAP_EXTENDS = 1, 2, 4, 8  # pl_clear_flags
+RAYS_STOP, RAYS_MISS, SHADOWS_MISS, MAP_EXTENDS, FRONT_OPEN, BACK_OPEN = 1, 2, 4, 8, 16, 32  # pl_clear_flags
 GUIDE_CELLS = 64  # PL_GUIDE_CELLS of native/include/patchlight.h
 
 LIBRARY_PATTERNS = {
@@ -229,6 +229,8 @@ def _clear_flags(material):
         RAYS_MISS: not material.meets_light,
         SHADOWS_MISS: not material.meets_shadow_rays,
         MAP_EXTENDS: material.textures_extend,
+        FRONT_OPEN: material.open_side == "front",
+        BACK_OPEN: material.open_side == "back",
     }
     return sum(flag for flag, is_set in flags.items() if is_set)
 

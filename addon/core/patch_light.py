@@ -96,7 +96,7 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, coun
     black = PatchSolution(
         radiosity=np.zeros((kernel.side_count, 3), np.float32),
         direct=np.zeros((kernel.side_count, 3), np.float32),
-        reflectance=np.zeros((len(patches), 3), np.float32),
+        reflectance=np.zeros((2 * len(patches), 3), np.float32),
         kinds=np.full(kernel.side_count, EVEN, np.uint8),
         reaches=np.zeros(kernel.side_count, np.float32),
         sky=sky,
@@ -115,7 +115,7 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, coun
 def _measured(patches: Patches, wanted):
     """(patches, points on each, share of the work done after them) of those wanted that scatter: those of a full-size
     cell, and of small ones."""
-    wanted = wanted & ((patches.reflectance.max(axis=1, initial=0.0) > 0) | patches.is_translucent)
+    wanted = wanted & (patches.side_reflectance.reshape(-1, 6).any(axis=1) | patches.is_translucent)
     cell_areas = np.bincount(patches.cells, patches.areas)
     is_large = cell_areas[patches.cells] > SMALL * patches.size**2
     return (np.flatnonzero(is_large & wanted), POINTS, 0.5), (np.flatnonzero(~is_large & wanted), 1, 1.0)

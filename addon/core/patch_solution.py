@@ -31,7 +31,7 @@ class PatchSolution:
     ----------
     radiosity : float32 (2 P, 3) reflected radiosity of the sides, emission left out [W/m^2]
     direct : float32 (2 P, 3) the part of it that is the lights' direct light reflected once [W/m^2]
-    reflectance : float32 (P, 3)
+    reflectance : float32 (2 P, 3)
     kinds : uint8 (2 P,) EVEN, MIXED (lights reach one part of the side only) or LIGHT (receivers sample it as a light)
     reaches : float32 (2 P,) rays that hit from nearer do not take the side's mean [m]; inf in narrow gaps, and
         where something parts them in two; ALWAYS where the mean is all that there is
@@ -50,7 +50,7 @@ class PatchSolution:
         return self.radiosity, self.direct, self.reflectance, self.kinds, self.reaches, self.sky
 
     def __len__(self) -> int:
-        return len(self.reflectance)
+        return len(self.reflectance) // 2
 
     def looking_further(self, factor: float) -> PatchSolution:
         """The same for rays that go on from further away."""

@@ -35,10 +35,12 @@ class Patches:
     triangles : int32 (P,) which triangle each is part of, or the first of its pieces
     reflectance : float32 (P, 3) rho, the mean over the patch
     translucence : float32 (P, 3) the same of what leaves at the other side
+    back_reflectance : float32 (P, 3) rho of the backs; None = the same as of the fronts
     bounds : float32 (P, 4) where each lies on its triangle: distance from the apex at its wide and its narrow end, and
         from the next corner to the one after at its first and its second side, all as shares
     apexes : uint8 (T,)
     cells : int32 (P,) which cell of its triangle's grid each is, or is part of, or the first of its pieces
+    open_sides : bool (P, 2) which sides no ray meets; None = none of them all
     owners, pieces : int32 (Q,) which patch each of ``pieces`` (Q) is part of, where some were joined; these have the
         bounds then
     """
@@ -52,6 +54,8 @@ class Patches:
     bounds: np.ndarray
     apexes: np.ndarray
     cells: np.ndarray
+    back_reflectance: np.ndarray | None = None
+    open_sides: np.ndarray | None = None
     owners: np.ndarray | None = None
     pieces: Patches | None = None
 
@@ -61,12 +65,23 @@ class Patches:
     @property
     def side_areas(self):
         """Area of each unknown's side that rays meet, float64 (2 P,) [m^2]."""
-        return np.repeat(self.met, 2)
+        areas = np.repeat(self.met, 2)
+        return areas if self.open_sides is None else np.where(self.open_sides.ravel(), 0.0, areas)
 
     @property
     def side_reflectance(self):
-        """Reflectance of each unknown, float32 (2 P, 3)."""
-        return np.repeat(self.reflectance, 2, axis=0)
+        """Reflectance of each unknown, float32 (2 P, 3); an open side sends out nothing."""
+        reflectance = np.repeat(self.reflectance, 2, axis=0)
+        if self.back_reflectance is not None:
+            reflectance[1::2] = self.back_reflectance
+        if self.open_sides is not None:
+            reflectance[self.open_sides.ravel()] = 0
+        return reflectance
+
+    @property
+    def has_like_sides(self) -> bool:
+        """Whether the backs of all are as their fronts."""
+        return self.back_reflectance is None and self.open_sides is None
 
     @property
     def is_translucent(self):
@@ -242,10 +257,26 @@ def with_materials(scene: Scene, kernel: KernelScene, patches: Patches, seed: in
         most = np.minimum(1, (1 - passing) / np.maximum(share, 1e-6)[:, None]).astype(np.float32)
         met = share * patches.areas
     reflectance = np.minimum(reflectance, most)
+    back_reflectance = None
+    if any(material.back is not None for material in scene.materials):
+        of_backs = _mean_over(scene, kernel, patches, "reflectance", TEXTURE_SAMPLES, seed, of_back=True)
+        back_reflectance = np.minimum(of_backs, most)
     if any(material.is_translucent for material in scene.materials):
         translucence = _mean_over(scene, kernel, patches, "translucence", TEXTURE_SAMPLES, seed)
         translucence = np.minimum(translucence, most - reflectance)
-    return replace(patches, met=met, reflectance=reflectance, translucence=translucence)
+    return replace(
+        patches,
+        met=met,
+        reflectance=reflectance,
+        translucence=translucence,
+        back_reflectance=back_reflectance,
+        open_sides=_open_sides(scene, patches),
+    )
+
+
+def _open_sides(scene, patches):
+    by_material = np.array([[m.open_side == side for side in ("front", "back")] for m in scene.materials], bool)
+    return by_material[scene.triangle_materials[patches.triangles]] if by_material.any() else None
 
 
 def _met_share(scene, patches, passing):
@@ -257,13 +288,16 @@ def _met_share(scene, patches, passing):
     return np.where(is_met[materials], np.maximum(1 - passing, least[materials]), 0.0)
 
 
-def _mean_over(scene, kernel, patches, factor, samples, seed):
+def _mean_over(scene, kernel, patches, factor, samples, seed, of_back=False):
     """The mean over each patch of a material's ``factor``, of [0, 1], times its texture: float32 (P, 3)."""
     materials = scene.triangle_materials[patches.triangles]
-    means = np.array([getattr(m, factor) for m in scene.materials], np.float32).reshape(-1, 3)[materials]
-    is_textured = np.array([getattr(m, f"{factor}_texture") is not None for m in scene.materials], bool)[materials]
+    sides = [m.of_back if of_back else m for m in scene.materials]
+    means = np.array([getattr(side, factor) for side in sides], np.float32).reshape(-1, 3)[materials]
+    is_textured = np.array([getattr(side, f"{factor}_texture") is not None for side in sides], bool)[materials]
     textured = np.flatnonzero(is_textured)
     for part in np.array_split(textured, len(textured) // BLOCK + 1):
         points, barycentrics = kernel.patch_points(part, samples, seed)
-        means[part] = textured_colours(scene, points, barycentrics, factor).reshape(-1, samples, 3).mean(axis=1)
+        means[part] = (
+            textured_colours(scene, points, barycentrics, factor, of_back).reshape(-1, samples, 3).mean(axis=1)
+        )
     return np.clip(means, 0.0, 1.0)

@@ -91,7 +91,7 @@ def _solved(
 ) -> tuple[Solved, Patches]:
     """The same without the laws, and the patches: those that a lightmap's texels mend are rough."""
     error = max(settings.error, LIGHTMAP_ERROR) if is_rough else settings.error
-    needs_rays = next((m.name for m in scene.materials if m.is_translucent or m.passes_colour), None)
+    needs_rays = next((m.name for m in scene.materials if m.is_translucent or m.passes_colour or m.open_side), None)
     looked_at = len(scene.triangles), _side_count(scene, settings), mean_reflectance(scene), is_rough, needs_rays
     solver, method, choice = choose(settings, *looked_at)
 
@@ -112,7 +112,7 @@ def _solved(
         else:
             grid = grid_of(scene, patch_size_for(scene, budget), budget)
             patches = finer_where_parted(scene, kernel, grid, budget, settings.seed)
-            if is_rough:
+            if is_rough and patches.has_like_sides:  # what is joined has one reflectance
                 patches = joined(scene, kernel, grid, patches)
         lit = measure(patches, within(on_step, 0.0, 0.4))
     else:
@@ -129,14 +129,15 @@ def _solved(
     field = PatchSolution(
         radiosity=solution.radiosity.astype(np.float32),
         direct=patches.scattered(lit.direct).astype(np.float32),
-        reflectance=np.ascontiguousarray(patches.reflectance, np.float32),
+        reflectance=np.ascontiguousarray(patches.side_reflectance, np.float32),
         kinds=kinds,
         reaches=reaches,
         sky=sky,
     )
     sources = with_bright_sides(scene, kernel.centre, patches, emitters, solution.radiosity, bright)
     rays = {"patches": lit.rays, "solve": solution.rays}
-    keeps_all_light = bool((patches.reflectance + patches.translucence > MOST_REFLECTANCE).any())
+    sent_on = patches.side_reflectance + np.repeat(patches.translucence, 2, axis=0)
+    keeps_all_light = bool((sent_on > MOST_REFLECTANCE).any())
     return Solved(field, emitters, sources, solution, Laws(), method, choice, keeps_all_light, rays), patches
 
 

@@ -53,8 +53,21 @@ class Texture:
 
 
 @dataclass(frozen=True, slots=True)
+class Back:
+    """Of a surface's back, what Material says of the front; both look up their textures at the same UVs."""
+
+    reflectance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    reflectance_texture: Texture | None = None
+    radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    radiance_texture: Texture | None = None
+
+    def __post_init__(self):
+        require_colour("a back", "reflectance", self.reflectance, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Material:
-    """A two-sided Lambertian surface, or what of one an image leaves.
+    """A Lambertian surface, or what of one an image leaves; both sides are the same unless ``back`` says otherwise.
 
     Rays meet it with a chance of 1 less the mean of its transmittance, and pass straight through else.
 
@@ -72,6 +85,8 @@ class Material:
     translucence : (3,) diffuse transmittance [0..1] for the light that meets it, which leaves at the other side: no
         more than is not reflected; multiplies the texture where there is one
     translucence_texture : Texture or None
+    back : Back or None, what the back is like where it is not like the front; nothing that is translucent has one
+    open_side : "front" or "back": which side all rays pass, as if nothing were there; None = neither
     textures_extend : whether its textures go on beyond UVs of 0 to 1 as at their edges; False = they repeat
     meets_shadow_rays : whether it hides lights; False = they shine through it
     meets_light : whether light that bounces meets it; False = it passes, and nobody sees the surface, which must not
@@ -87,6 +102,8 @@ class Material:
     transmittance_texture: Texture | None = None
     translucence: tuple[float, float, float] = (0.0, 0.0, 0.0)
     translucence_texture: Texture | None = None
+    back: Back | None = None
+    open_side: str | None = None
     textures_extend: bool = False
     meets_shadow_rays: bool = True
     meets_light: bool = True
@@ -95,15 +112,21 @@ class Material:
         owner = f"material {self.name}"
         require_colour(owner, "reflectance", self.reflectance, 1.0)
         require_colour(owner, "radiance", self.radiance, BRIGHTEST)
-        if self.radiance_texture is not None:
-            brightest = np.array(self.radiance, np.float64) * self.radiance_texture.pixels.max(axis=(0, 1))
+        for side in (self, self.of_back):
+            brightest = np.array(side.radiance, np.float64)
+            if side.radiance_texture is not None:
+                brightest = brightest * side.radiance_texture.pixels.max(axis=(0, 1))
             require_colour(owner, "radiance times its texture", brightest, BRIGHTEST)
+        if self.open_side not in (None, "front", "back"):
+            raise SceneError(f"{owner}: open_side is {self.open_side!r}: allowed are 'front', 'back' and None")
+        if self.is_translucent and not (self.open_side is None and self.back is None):
+            raise SceneError(f"{owner} is translucent: both of its sides must be the same")
         require_colour(owner, "translucence", self.translucence, 1.0)
         require_colour(owner, "transmittance", self.transmittance, 1.0)
         if self.transmittance_texture is not None:
             most = np.array(self.transmittance, np.float64) * self.transmittance_texture.pixels.max(axis=(0, 1))
             require_colour(owner, "transmittance times its texture", most, 1.0)
-        if not self.meets_light and max(*self.reflectance, *self.radiance, *self.translucence) > 0:
+        if not self.meets_light and (self.emits or max(*self.reflectance, *self.translucence) > 0):
             raise SceneError(f"{owner} sends on light, which nobody sees")
         if not any((self.reflectance_texture, self.transmittance_texture, self.translucence_texture)):
             self._require_no_gain()
@@ -118,26 +141,36 @@ class Material:
     def is_nothing(self) -> bool:
         """Whether all light passes as if it were not there."""
         passes_all = self.transmittance_texture is None and min(self.transmittance) == 1
-        return passes_all and max(*self.reflectance, *self.radiance, *self.translucence) == 0
+        scatters = max(*self.reflectance, *self.of_back.reflectance, *self.translucence) > 0
+        return passes_all and not scatters and not self.emits
 
     @property
     def transmits(self) -> bool:
         return max(self.transmittance) > 0
 
+    @property
+    def of_back(self) -> Material | Back:
+        """What has the back's reflectance and radiance."""
+        return self.back or self
+
     def seen_by(self, shadow_rays: bool, light: bool) -> Material:
         """The material on a surface that hides lights or not, and that light that bounces meets or not."""
-        nothing = {} if light else dict.fromkeys(("reflectance", "radiance", "translucence"), (0.0, 0.0, 0.0))
-        return replace(self, meets_shadow_rays=shadow_rays, meets_light=light, **nothing)
+        made = replace(self, meets_shadow_rays=shadow_rays)
+        if light:
+            return made
+        nothing = dict.fromkeys(("reflectance", "radiance", "translucence"), (0.0, 0.0, 0.0))
+        return replace(made, meets_light=False, back=None, **nothing)
 
     @property
     def is_opaque(self) -> bool:
         """Whether all rays meet it, and none passes."""
-        return not self.transmits and self.meets_shadow_rays and self.meets_light
+        return not self.transmits and self.open_side is None and self.meets_shadow_rays and self.meets_light
 
     @property
     def stops_light(self) -> bool:
         """Whether light that bounces meets some of it; what glass does not pass is lost: all rays pass it, tinted."""
-        is_glass = self.transmits and max(self.reflectance) == 0 and not self.is_translucent
+        reflects = max(*self.reflectance, *self.of_back.reflectance) > 0
+        is_glass = self.transmits and not reflects and not self.is_translucent
         return self.meets_light and not is_glass
 
     @property
@@ -153,7 +186,7 @@ class Material:
 
     @property
     def emits(self) -> bool:
-        return max(self.radiance) > 0
+        return max(*self.radiance, *self.of_back.radiance) > 0
 
 
 @dataclass(frozen=True, slots=True)

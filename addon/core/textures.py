@@ -43,13 +43,17 @@ def scattered_shares(scene: Scene, triangles, barycentrics):
     return reflectance, np.clip(translucence, 0, 1 - reflectance)
 
 
-def textured_colours(scene: Scene, triangles, barycentrics, factor: str):
-    """A material's ``factor``, as Material names it, times its texture, at points of triangles: float32 (N, 3)."""
-    factors = np.array([getattr(m, factor) for m in scene.materials], np.float32).reshape(-1, 3)
+def textured_colours(scene: Scene, triangles, barycentrics, factor: str, of_back=False):
+    """A material's ``factor``, as Material names it, times its texture, at points of triangles: float32 (N, 3).
+
+    ``of_back``: of the back, as Back names it.
+    """
+    sides = [m.of_back if of_back else m for m in scene.materials]
+    factors = np.array([getattr(side, factor) for side in sides], np.float32).reshape(-1, 3)
     materials = scene.triangle_materials[triangles]
     colours = factors[materials]
     for index, material in enumerate(scene.materials):
-        image = getattr(material, f"{factor}_texture")
+        image = getattr(sides[index], f"{factor}_texture")
         if image is None:
             continue
         at = np.flatnonzero(materials == index)

@@ -58,7 +58,9 @@ typedef enum pl_clear_flags {
     PL_RAYS_STOP = 1, /* scattered rays meet what does not pass, and see the triangle; else that is lost, as in glass */
     PL_RAYS_MISS = 2, /* scattered rays pass as if it were not there */
     PL_SHADOWS_MISS = 4, /* shadow rays do */
-    PL_MAP_EXTENDS = 8   /* beyond 0 .. 1 its map is as at the edges */
+    PL_MAP_EXTENDS = 8,  /* beyond 0 .. 1 its map is as at the edges */
+    PL_FRONT_OPEN = 16,  /* all rays pass that hit its front, as if it were not there */
+    PL_BACK_OPEN = 32    /* or its back */
 } pl_clear_flags;
 typedef struct pl_clear {
     const float *transmittance;
@@ -197,7 +199,8 @@ void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *
  *   first, count   the range of rays
  *   io_received    3 * 2 * patch_count: what has landed, added to atomically; integers, so that the sum
  *                  does not depend on the order
- *   io_escaped     3: what left the scene
+ *   io_escaped     3: what left the scene, or met an open side: what meets the other side lands and goes on, as rays
+ * that look back along it would have it
  */
 void pl_shoot(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t side_count,
               const uint64_t *first_rays, const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first,
@@ -258,7 +261,7 @@ void pl_scene_centre(const pl_scene *scene, double out_centre[3]);
  *
  *   radiosity    3 * 2 * patch_count: reflected radiosity, emission left out
  *   direct       3 * 2 * patch_count: the part of it that is the lights' direct light reflected once
- *   reflectance  3 * patch_count
+ *   reflectance  3 * 2 * patch_count
  *   kinds        2 * patch_count, a pl_side_kind each
  *   reaches      2 * patch_count: a ray that hits a side from nearer than this [m] does not take its mean
  *                but goes on from the point hit, as the patch may lie half under something; INFINITY for a

@@ -42,7 +42,7 @@ enum {
 };
 #define GATHER_ARRAYS(sides)                                                                                           \
     {"radiosity", 'f', 3, sides, false, {0}}, {"direct", 'f', 3, sides, false, {0}},                                   \
-        {"reflectance", 'f', 3, (sides) / 2, false, {0}}, {"kinds", 'B', 1, sides, false, {0}},                        \
+        {"reflectance", 'f', 3, sides, false, {0}}, {"kinds", 'B', 1, sides, false, {0}},                              \
         {"reaches", 'f', 1, sides, false, {0}}, {"sky", 'f', 3, -1, false, {0}},                                       \
         {"texel_uvs", 'f', 6, -1, false, {0}}, {"texel_light", 'Q', 1, -1, false, {0}}, LIGHT_ARRAYS(LIGHTS_AT),       \
         RECEIVER_ARRAYS(RECEIVERS_AT)

@@ -99,6 +99,11 @@ static float number_of(const pl_hit *hit) {
     return unit_float(hash_pair(hash_pair(u.bits, v.bits), hash_pair(distance.bits, (uint32_t)hit->triangle)));
 }
 
+/* Whether a ray passes a clear triangle as if it were not there: of one kind of rays, or on an open side. */
+static bool misses(const pl_clear *clear, const pl_hit *hit, pl_clear_flags kind) {
+    return clear->flags[hit->triangle] & (kind | (hit->is_back ? PL_BACK_OPEN : PL_FRONT_OPEN));
+}
+
 bool transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, float io_rgb[3]) {
     float near = 0;
     if (!scene->clear_layer.bvh)
@@ -108,7 +113,7 @@ bool transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, flo
         if (hit.triangle < 0)
             break;
         near = nextafterf(hit.distance, INFINITY);
-        if (scene->clear.flags[hit.triangle] & PL_SHADOWS_MISS)
+        if (misses(&scene->clear, &hit, PL_SHADOWS_MISS))
             continue;
         float through[3];
         transmittance_at(&scene->clear, &hit, through);
@@ -118,9 +123,11 @@ bool transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, flo
     return io_rgb[0] > 0 || io_rgb[1] > 0 || io_rgb[2] > 0;
 }
 
-pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_rgb[3]) {
-    const pl_hit end = closest_hit(scene, origin, direction, 0);
-    float near = 0;
+/* The first triangle from `near` on that stops a scattered ray; of one with an open side, where `minds_open`, its other
+ * side alone. */
+static pl_hit stop_from(const pl_scene *scene, vec3 origin, vec3 direction, float near, bool minds_open,
+                        float io_rgb[3]) {
+    const pl_hit end = closest_hit(scene, origin, direction, near);
     if (!scene->clear_layer.bvh)
         return end;
     for (int faces = 0; faces < MOST_FACES; ++faces) {
@@ -128,11 +135,12 @@ pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_r
         if (hit.triangle < 0)
             break;
         near = nextafterf(hit.distance, INFINITY);
-        if (scene->clear.flags[hit.triangle] & PL_RAYS_MISS)
+        const uint8_t flags = scene->clear.flags[hit.triangle];
+        if (minds_open ? misses(&scene->clear, &hit, PL_RAYS_MISS) : (bool)(flags & PL_RAYS_MISS))
             continue;
         float through[3], passing = 1;
         transmittance_at(&scene->clear, &hit, through);
-        if (scene->clear.flags[hit.triangle] & PL_RAYS_STOP) {
+        if (flags & PL_RAYS_STOP) {
             /* exact for grey: nothing is lost then */
             passing = through[1] + ((through[0] - through[1]) + (through[2] - through[1])) / 3;
             if (number_of(&hit) >= passing)
@@ -142,4 +150,21 @@ pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_r
             io_rgb[k] *= through[k] / passing;
     }
     return end;
+}
+
+pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_rgb[3]) {
+    return stop_from(scene, origin, direction, 0, true, io_rgb);
+}
+
+pl_hit next_landing(const pl_scene *scene, vec3 origin, vec3 direction, float *io_near, float io_rgb[3]) {
+    const pl_hit hit = stop_from(scene, origin, direction, *io_near, false, io_rgb);
+    *io_near = INFINITY;
+    if (hit.triangle < 0 || !scene->clear_layer.bvh)
+        return hit;
+    const uint8_t flags = scene->clear.flags[hit.triangle];
+    if (flags & (hit.is_back ? PL_BACK_OPEN : PL_FRONT_OPEN))
+        return (pl_hit){.triangle = -1, .distance = hit.distance};
+    if (flags & (PL_BACK_OPEN | PL_FRONT_OPEN))
+        *io_near = nextafterf(hit.distance, INFINITY);
+    return hit;
 }

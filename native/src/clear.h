@@ -18,4 +18,12 @@ bool transmit(const pl_scene *scene, vec3 origin, vec3 direction, float far, flo
  */
 pl_hit first_stop(const pl_scene *scene, vec3 origin, vec3 direction, float io_rgb[3]);
 
+/*
+ * Where light that is sent along a ray lands next, from *io_near on, which becomes where it goes on from, or INFINITY.
+ *
+ * As rays look back along it: those from beyond a triangle whose other side is open see through it, although it has got
+ * the light; those beyond one that the light meets on its open side do not.
+ */
+pl_hit next_landing(const pl_scene *scene, vec3 origin, vec3 direction, float *io_near, float io_rgb[3]);
+
 #endif

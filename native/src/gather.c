@@ -71,7 +71,7 @@ static void sample_direct(gather_job *job, const pl_hit *hit, size_t side, ray_r
         direct_at_point(job->scene, job->lights, &job->balls, job->importances, hit_point(job->scene, hit, normal),
                         normal, hash_pair(random->seed, ++random->drawn), rgb);
     for (int k = 0; k < 3; ++k)
-        io_sum[k] += rgb[k] * weight[k] * job->solution->reflectance[3 * (side / 2) + (size_t)k];
+        io_sum[k] += rgb[k] * weight[k] * job->solution->reflectance[3 * side + (size_t)k];
 }
 
 /* Of three floats in one number. */
@@ -156,7 +156,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
         const float x = draw(&random), y = draw(&random);
         direction = cosine_direction(x, y, u, v, normal);
         for (int k = 0; k < 3; ++k)
-            weight[k] *= solution->reflectance[3 * (side / 2) + (size_t)k];
+            weight[k] *= solution->reflectance[3 * side + (size_t)k];
         /* Russian roulette: what carries little ends early, and what is left stands for it */
         const float survival = lesser(greater(weight[0], greater(weight[1], weight[2])), 1);
         if (draw(&random) >= survival)

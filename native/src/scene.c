@@ -4,11 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { SOME_PASS = PL_RAYS_MISS | PL_SHADOWS_MISS | PL_FRONT_OPEN | PL_BACK_OPEN };
+
 static bool is_clear(const pl_scene *scene, size_t triangle) {
     if (!scene->clear.transmittance)
         return false;
     const float *t = scene->clear.transmittance + 3 * triangle;
-    return t[0] > 0 || t[1] > 0 || t[2] > 0 || scene->clear.flags[triangle] & (PL_RAYS_MISS | PL_SHADOWS_MISS);
+    return t[0] > 0 || t[1] > 0 || t[2] > 0 || scene->clear.flags[triangle] & SOME_PASS;
 }
 
 static void recentre(pl_scene *scene, const double *vertices) {

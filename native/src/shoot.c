@@ -7,6 +7,8 @@
 
 #include <string.h>
 
+enum { MOST_LANDINGS = 256 }; /* of a ray, on surfaces whose other side is open */
+
 /* Sums of integers do not depend on the order, so any number of threads gives the same bytes. */
 static void add_flux(uint64_t *io_rgb, const uint64_t *rgb) {
     for (int k = 0; k < 3; ++k)
@@ -45,11 +47,13 @@ void pl_shoot(const pl_scene *scene, const pl_patches *patches, const int32_t *s
         const vec3 direction =
             cosine_direction(sobol(k, 2, side_seed), sobol(k, 3, side_seed), from.u, from.v, from.normal);
 
-        float through[3] = {1, 1, 1};
-        const pl_hit hit = first_stop(scene, from.origin, direction, through);
-        uint64_t flux[3];
-        for (size_t c = 0; c < 3; ++c)
-            flux[c] = through[c] == 1 ? ray_flux[3 * i + c] : (uint64_t)((double)ray_flux[3 * i + c] * through[c]);
-        add_flux(hit.triangle < 0 ? io_escaped : io_received + 3 * hit_side(patches, &hit), flux);
+        float through[3] = {1, 1, 1}, near = 0;
+        for (int landings = 0; landings < MOST_LANDINGS && near < INFINITY; ++landings) {
+            const pl_hit hit = next_landing(scene, from.origin, direction, &near, through);
+            uint64_t flux[3];
+            for (size_t c = 0; c < 3; ++c)
+                flux[c] = through[c] == 1 ? ray_flux[3 * i + c] : (uint64_t)((double)ray_flux[3 * i + c] * through[c]);
+            add_flux(hit.triangle < 0 ? io_escaped : io_received + 3 * hit_side(patches, &hit), flux);
+        }
     }
 }

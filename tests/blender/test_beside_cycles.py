@@ -227,7 +227,28 @@ def velvet(add_mesh, nodes):
     lamp((2, 1.5, 2))
 
 
-ROOMS = [curtain, leaves, lampshade, screen, tiles, painted, unseen, modified, fittings, edges, velvet]
+def one_sided(add_mesh, nodes):
+    """A panel that glows in front, a wall that is nothing from behind, in the sun, and a board of two colours."""
+    warm, cold = ("BsdfDiffuse", {"Color": (0.7, 0.4, 0.1, 1)}), ("BsdfDiffuse", {"Color": (0.1, 0.3, 0.7, 1)})
+    glow, nothing = ("Emission", {"Strength": 4.0}), ("BsdfTransparent", {})
+    both = {"panel": (glow, cold), "wall": (warm, nothing), "cut": (nothing, cold), "board": (warm, cold)}
+    places = {  # corner, and two sides
+        "panel": ((0.5, 2.5, 1.5), (0, 1, 0), (1, 0, 0)),
+        "wall": ((0, 0, 0), (4, 0, 0), (0, 0, 3)),
+        "cut": ((0.4, 0.5, 0.6), (0, 1.5, 0), (0, 0, 1.5)),
+        "board": ((3.5, 0.5, 0.6), (0, 2, 0), (0, 0, 1.5)),
+    }
+    for name, shaders in both.items():
+        material, tree = nodes(name)
+        mix = tree.link(tree.new("NewGeometry"), tree.new("MixShader"), "Backfacing", 0)
+        for k, (kind, inputs) in enumerate(shaders):
+            tree.link(tree.new(kind, **inputs), mix, 0, k + 1)
+        tree.show(mix)
+        quad(add_mesh, name, *places[name], material)
+    sunlight(2.0)
+
+
+ROOMS = [curtain, leaves, lampshade, screen, tiles, painted, unseen, modified, fittings, edges, velvet, one_sided]
 
 
 @pytest.mark.parametrize("furnish", ROOMS)

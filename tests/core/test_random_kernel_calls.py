@@ -42,7 +42,7 @@ def sound_meshes(draw):
 def clear_triangles(draw, count):
     """Glass and cloth, grey, and images on them, now and then ones that are not there."""
     shares = np.repeat(arrays(draw, (count, 1), np.float32, st.sampled_from((0, 0.5, 0.3, 1))), 3, axis=1)
-    rays = arrays(draw, count, np.uint8, st.integers(0, 7))
+    rays = arrays(draw, count, np.uint8, st.integers(0, 63))
     maps = arrays(draw, count, np.int32, st.sampled_from((-1, -1, 0, 1, 1, 5, -7)))
     shapes = np.int32([[0, 2, 3], [6, 1, 1]])[: draw(st.integers(0, 2))]
     shapes += arrays(draw, shapes.shape, np.int32, st.sampled_from((0, 0, 0, 0, 0, 0, -3, 1 << 30)))

@@ -59,7 +59,7 @@ def gathered_in_a_box(light, is_split):
         patches = subdivide(scene, kernel, 0.5, 1000, 0)
         dark, count = np.zeros((2 * len(patches), 3), np.float32), 16
         field = PatchSolution(
-            dark, dark, patches.reflectance, np.full(len(dark), EVEN, np.uint8), np.zeros(len(dark), np.float32),
+            dark, dark, patches.side_reflectance, np.full(len(dark), EVEN, np.uint8), np.zeros(len(dark), np.float32),
             np.zeros((1, 3), np.float32),
         )  # fmt: skip
         sums = no_sums(len(receivers), 1)

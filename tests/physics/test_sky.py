@@ -83,7 +83,7 @@ def gathered(scene, receivers, sky, rays):
         patches = subdivide(scene, kernel, 10.0, 16, 0)
         nothing, sides = np.zeros((2 * len(patches), 3), np.float32), 2 * len(patches)
         field = PatchSolution(
-            nothing, nothing, nothing[: len(patches)], np.full(sides, EVEN, np.uint8), np.zeros(sides, np.float32), sky
+            nothing, nothing, nothing, np.full(sides, EVEN, np.uint8), np.zeros(sides, np.float32), sky
         )
         sums = no_sums(len(receivers), 1)
         everyone = np.arange(len(receivers), dtype=np.uint32)
