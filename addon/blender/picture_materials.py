@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import bpy
 
-from .read_materials import DIFFUSE, GLOSSY, PASSING, TRANSLUCENT
+from .read_materials import DIFFUSE, GLOSSY, PASSING, TRANSLUCENT, VELVET
 from .read_mesh import LIGHTMAP_LAYER
 
-LIT = DIFFUSE | GLOSSY | TRANSLUCENT  # shaders that the stored light is seen by, and their colours' names
+LIT = DIFFUSE | VELVET | GLOSSY | TRANSLUCENT  # shaders that the stored light is seen by, and their colours' names
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,20 +13,18 @@ import numpy as np
 from ..core.scene import BRIGHTEST, Material
 from .colour_nodes import grey, read_colour_node
 from .mesh_colours import MeshColours
-from .private_render import ON_DIFFUSE_SURFACES, RenderError
-from .read_images import Images, mean_colour, rim_of
+from .private_render import ON_DIFFUSE_SURFACES
+from .read_images import mean_colour, rim_of
 from .read_mesh import BAKED_COLOURS
-from .render_colours import ShaderInput, rendered_means
+from .render_colours import ShaderInput
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, output_input, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
 from .two_sides import two_sided
 from .view_nodes import mean_over_view
 
-NO_MATERIAL = Material("no material")
-EVERY_RAY = (True, True)  # shadow rays, and light that bounces
-
 DIFFUSE = {"BSDF_DIFFUSE": "Color", "SUBSURFACE_SCATTERING": "Color", "BSDF_TOON": "Color"}
+VELVET = {"BSDF_SHEEN": "Color"}
 # what white sheen reflects of light from all around, by roughness: as Cycles shows it in a white room
 SHEEN = (0.0, 0.1, 0.3, 0.5, 0.7, 1.0), (0.0, 0.003, 0.035, 0.118, 0.244, 0.447)
 GLOSSY = {
@@ -42,78 +40,6 @@ COLOURS_OF_MESH = {"VERTEX_COLOR": "layer_name", "ATTRIBUTE": "attribute_name"} 
 SEEN_BY_ANGLE = {"FRESNEL", "LAYER_WEIGHT"}
 # Their output depends on the ray: where they cannot be read, 0 is a front, and no kind of ray that a bake has.
 BY_VIEW = {*SEEN_BY_ANGLE, "LIGHT_PATH", "NEW_GEOMETRY"}
-
-
-class Materials:
-    """The materials of one scene; ``entries[i]`` has the coordinates ``coordinates[i]``, and is final once finished."""
-
-    def __init__(self, depsgraph, warn):
-        self.entries = [NO_MATERIAL]
-        self.coordinates = [Coordinates()]
-        self.volumes = set()  # rows of those that have no surface
-        self._indices, self._on_unseen = {}, {}
-        self._guessed, self._sentences = [()], [()]  # of each entry; what was read of its images is not to stay
-        self._depsgraph = depsgraph
-        self._warn = warn
-        self._images = Images(warn)
-
-    def index_of(self, material, is_seen_by=EVERY_RAY) -> int:
-        """Row of a Blender material (or None) in ``entries``, on objects that shadow rays and light meet, or one of
-        them."""
-        row = self._own_row(material)
-        if is_seen_by == EVERY_RAY:
-            return row
-        if (row, is_seen_by) not in self._on_unseen:
-            self._on_unseen[row, is_seen_by] = self._add(self.entries[row], self.coordinates[row])
-        return self._on_unseen[row, is_seen_by]
-
-    def _own_row(self, material):
-        if material is None:
-            return 0
-        key = material.original.as_pointer()
-        if key not in self._indices:
-            reading = MaterialReading(material.evaluated_get(self._depsgraph), self._images)
-            entry, coordinates = reading.material(), reading.coordinates()
-            if reading.is_volume:
-                self.volumes.add(len(self.entries))
-            self._indices[key] = self._add(entry, coordinates, tuple(reading.guessed), reading.sentences())
-        return self._indices[key]
-
-    def _add(self, entry, coordinates, guessed=(), sentences=()):
-        for rows, value in zip(
-            (self.entries, self.coordinates, self._guessed, self._sentences), (entry, coordinates, guessed, sentences)
-        ):
-            rows.append(value)
-        return len(self.entries) - 1
-
-    def finish(self) -> None:
-        """Have Cycles tell what could not be read, in one render for all, and say what is noteworthy."""
-        inputs = [place for guessed in self._guessed for place in guessed]
-        means = self._rendered(inputs) if inputs else {}
-        for row, guessed in enumerate(self._guessed):
-            told = {place: means[place] for place in guessed if place in means}
-            if told:
-                self._read_again(row, told)
-            for sentence in self._sentences[row]:
-                self._warn(f"material '{self.entries[row].name}': {sentence}")
-        for (row, is_seen_by), on_unseen in self._on_unseen.items():
-            self.entries[on_unseen] = self.entries[row].seen_by(*is_seen_by)
-
-    def _read_again(self, row, told):
-        original = next(iter(told)).material  # what was evaluated may be gone after a render
-        reading = MaterialReading(original.evaluated_get(self._depsgraph), self._images, told)
-        entry = reading.material()
-        if reading.coordinates() == self.coordinates[row]:  # by which triangles have their UVs
-            self.entries[row], self._sentences[row] = entry, reading.sentences()
-
-    def _rendered(self, inputs):
-        try:
-            means = rendered_means(inputs, self._depsgraph.scene.frame_current)
-        except RenderError as error:
-            self._warn(f"what cannot be read of materials cannot be rendered either: {error}")
-            return {}
-        return {place: mean for place, mean in zip(inputs, means) if mean is not None}
-
 
 ALL = Colour(np.ones(3))
 NOTHING = Surface(transmittance=ALL)  # all light passes
@@ -238,8 +164,8 @@ class MaterialReading:
             return Surface(radiance=self._emitted(reached, "Color", "Strength"))
         if kind in DIFFUSE:
             return Surface(self._colour(reached, DIFFUSE[kind]).within(1.0))
-        if kind == "BSDF_SHEEN":
-            colour = self._colour(reached, "Color").within(1.0)
+        if kind in VELVET:
+            colour = self._colour(reached, VELVET[kind]).within(1.0)
             return Surface(colour.scaled(np.interp(self._amount(reached, "Roughness").mean[0], *SHEEN)))
         if kind in GLOSSY:
             self.say(f"its {reached.node.bl_label} is baked as diffuse")

@@ -14,11 +14,11 @@ import numpy as np
 from ..core.scene import Scene, SceneError, SceneObject
 from ..core.settings import BakeSettings
 from .as_rendered import as_rendered
+from .materials import Materials
 from .mesh_colours import MeshColours
 from .new_meshes import NewMeshes
 from .place_mesh import PlacedMesh, place_mesh, unit_normals
 from .read_lights import read_lights
-from .read_materials import Materials
 from .read_mesh import MeshArrays, are_finite, read_mesh
 from .read_world import read_world
 from .rects import in_lightmap, rect_of

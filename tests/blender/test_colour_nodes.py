@@ -278,7 +278,7 @@ def without_renders(monkeypatch):
     def fail(*_):
         raise RenderError("a render is running")
 
-    monkeypatch.setattr("addon.blender.read_materials.rendered_means", fail)
+    monkeypatch.setattr("addon.blender.materials.rendered_means", fail)
 
 
 def test_colours_mixed_by_noise_are_mixed_evenly_where_nothing_tells_and_it_is_said(nodes, plane, without_renders):

@@ -138,7 +138,7 @@ def test_a_group_is_looked_into_and_the_file_stays_as_it_is(nodes, read):
 
 
 def test_what_the_view_decides_is_not_rendered(nodes, read, monkeypatch):
-    monkeypatch.setattr("addon.blender.read_materials.rendered_means", None)  # calling it fails
+    monkeypatch.setattr("addon.blender.materials.rendered_means", None)  # calling it fails
     material, tree = nodes()
     mix = tree.link(tree.new("NewGeometry"), tree.new("MixShader"), "Backfacing", 0)
     tree.link(tree.new("BsdfDiffuse", Color=(*LIGHT, 1)), mix, 0, 1)
