@@ -20,7 +20,7 @@ from .render_colours import ShaderInput
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, output_input, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
-from .two_sides import two_sided
+from .two_sides import as_shadow_rays_see, two_sided
 from .view_nodes import mean_over_view
 
 DIFFUSE = {"BSDF_DIFFUSE": "Color", "SUBSURFACE_SCATTERING": "Color", "BSDF_TOON": "Color"}
@@ -35,7 +35,12 @@ GLOSSY = {
 }
 TRANSLUCENT = {"BSDF_TRANSLUCENT": "Color"}
 PASSING = {"BSDF_TRANSPARENT", "BSDF_GLASS", "BSDF_REFRACTION"}
-KINDS_OF_RAYS = {"Is Camera Ray", "Is Glossy Ray", "Is Singular Ray", "Is Transmission Ray", *ON_DIFFUSE_SURFACES}
+OF_SHADOW_RAYS = {"Is Shadow Ray": 1.0}
+KINDS_OF_RAYS = {
+    *("Is Camera Ray", "Is Glossy Ray", "Is Singular Ray", "Is Transmission Ray", "Is Volume Scatter Ray"),
+    *ON_DIFFUSE_SURFACES,
+    *OF_SHADOW_RAYS,
+}
 COLOURS_OF_MESH = {"VERTEX_COLOR": "layer_name", "ATTRIBUTE": "attribute_name"}  # nodes, and what names the attribute
 SEEN_BY_ANGLE = {"FRESNEL", "LAYER_WEIGHT"}
 # Their output depends on the ray: where they cannot be read, 0 is a front, and no kind of ray that a bake has.
@@ -68,9 +73,10 @@ class MaterialReading:
     """One material being read, each node once; what is noted of a node that turns out unreadable is forgotten.
 
     ``told`` are the mean colours of shaders' inputs that need not be guessed, ``guessed`` those inputs that were.
+    ``sees`` is what looks at the material: "front" or "back", light that bounces, or "shadow rays".
     """
 
-    def __init__(self, blender_material, images, told=None, is_back=False):
+    def __init__(self, blender_material, images, told=None, sees="front"):
         self.blender_material = blender_material
         self.guessed: dict[ShaderInput, bool] = {}
         self._told = told or {}
@@ -79,20 +85,20 @@ class MaterialReading:
         self._read = {}
         self._takes_mesh_colours = True
         self.is_volume = False  # and no surface
-        self._is_back, self._asks_for_side = is_back, False
+        self._sees, self._asked = sees, set()  # and which else might see it in another way
 
     def material(self) -> Material:
         """The core material; never silently black."""
-        front = self._one_side()
-        if not self._asks_for_side:
-            return front
-        reading = MaterialReading(self.blender_material, self._images, self._told, is_back=True)
-        back = reading._one_side()
-        self.guessed |= reading.guessed
-        self._notes.add(reading._notes)
-        return two_sided(front, back, self.say)
+        made = self._seen_so()
+        for sees, combined in (("back", two_sided), ("shadow rays", as_shadow_rays_see)):
+            if sees in self._asked:
+                reading = MaterialReading(self.blender_material, self._images, self._told, sees)
+                made = combined(made, reading._seen_so(), self.say)
+                self.guessed |= reading.guessed
+                self._notes.add(reading._notes)
+        return made
 
-    def _one_side(self) -> Material:
+    def _seen_so(self) -> Material:
         surface = self._surface()
         if len(self._notes.coordinates) > 1 and any(isinstance(kind, MeshColours) for kind in self._notes.coordinates):
             # a triangle has one place in textures: its image's
@@ -304,10 +310,12 @@ class MaterialReading:
         if reached.is_constant or reached.node.type in {"RGB", "VALUE"}:
             return Colour(constant_colour(reached))
         if reached.node.type == "LIGHT_PATH" and reached.socket.name in KINDS_OF_RAYS:
-            return Colour(np.full(3, ON_DIFFUSE_SURFACES.get(reached.socket.name, 0.0)))
+            self._asked.add("shadow rays")
+            values = OF_SHADOW_RAYS if self._sees == "shadow rays" else ON_DIFFUSE_SURFACES
+            return Colour(np.full(3, values.get(reached.socket.name, 0.0)))
         if reached.node.type == "NEW_GEOMETRY" and reached.socket.identifier == "Backfacing":
-            self._asks_for_side = True
-            return Colour(np.full(3, float(self._is_back)))
+            self._asked.add("back")
+            return Colour(np.full(3, float(self._sees == "back")))
         if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
         if reached.node.type in SEEN_BY_ANGLE:

@@ -1,4 +1,4 @@
-"""A material whose nodes ask which side is seen: two readings, of its front and of its back, made one."""
+"""A material whose nodes ask which side is seen, or by which rays: two readings of it, made one."""
 
 from __future__ import annotations
 
@@ -25,6 +25,18 @@ def two_sided(front: Material, back: Material, say) -> Material:
     if not _differ(front, back, (*REFLECTING, *GLOWING)):
         return front
     return replace(front, back=Back(**{name: getattr(back, name) for name in (*REFLECTING, *GLOWING)}))
+
+
+def as_shadow_rays_see(lit: Material, shadowing: Material, say) -> Material:
+    """The material as light that bounces sees it, and as shadow rays do: what these pass alone hides no lamp.
+
+    Whatever of it passes some of the light is ``lit`` for both.
+    """
+    if lit.is_nothing != shadowing.is_nothing:
+        return lit.seen_by(False, True) if shadowing.is_nothing else shadowing.seen_by(True, False)
+    if _differ(lit, shadowing, PASSING):
+        say("shadow rays pass it as light that bounces does")
+    return lit
 
 
 def _differ(one, other, names):

@@ -155,7 +155,7 @@ class Material:
 
     def seen_by(self, shadow_rays: bool, light: bool) -> Material:
         """The material on a surface that hides lights or not, and that light that bounces meets or not."""
-        made = replace(self, meets_shadow_rays=shadow_rays)
+        made = replace(self, meets_shadow_rays=self.meets_shadow_rays and shadow_rays)
         if light:
             return made
         nothing = dict.fromkeys(("reflectance", "radiance", "translucence"), (0.0, 0.0, 0.0))

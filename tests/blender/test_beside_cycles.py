@@ -149,6 +149,12 @@ def unseen(add_mesh, nodes):
     tree.show(tree.new("BsdfDiffuse", Color=(0.6, 0.6, 0.3, 1)))
     for k, switch in enumerate(("visible_shadow", "visible_diffuse", "visible_camera")):
         setattr(quad(add_mesh, switch, (0.5 + k, 1, 1.2), (0.8, 0, 0), (0, 2, 0), material), switch, False)
+    for k, kind in enumerate(("Is Shadow Ray", "Is Diffuse Ray")):
+        trick, tree = nodes(kind)
+        mix = tree.link(tree.new("LightPath"), tree.new("MixShader"), kind, 0)
+        tree.link(tree.new("BsdfDiffuse", Color=(0.3, 0.6, 0.6, 1)), mix, 0, 1)
+        tree.show(tree.link(tree.new("BsdfTransparent"), mix, 0, 2))
+        quad(add_mesh, kind, (0.3 + 2 * k, 3.2, 1.5), (1.5, 0, 0), (0, 0.7, 0), trick)
     lamp((1.5, 2, 2.5))
     lamp((3, 1, 0.8), 30.0).data.use_shadow = False
     lamp((1, 3, 0.8), 500.0).visible_diffuse = False

@@ -91,15 +91,40 @@ def test_light_is_what_rays_from_diffuse_surfaces_see(nodes, read, output, radia
     assert warnings == ()
 
 
-def test_shadow_rays_see_what_bounced_rays_see_and_it_is_said(nodes, read):
+@pytest.mark.parametrize(("kind", "meets"), [("Is Shadow Ray", (False, True)), ("Is Diffuse Ray", (True, False))])
+def test_nodes_that_let_one_kind_of_rays_pass(nodes, read, kind, meets):
     material, tree = nodes("Fake")
-    mix = tree.link(tree.new("LightPath"), tree.new("MixShader"), "Is Shadow Ray", 0)
+    mix = tree.link(tree.new("LightPath"), tree.new("MixShader"), kind, 0)
     tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
     tree.link(tree.new("BsdfTransparent"), mix, 0, 2)
     tree.show(mix)
-    found, (warning,) = read(material)
-    assert found.reflectance == GREY[:3]
-    assert "'Fake'" in warning
+    found, warnings = read(material)
+    assert (found.meets_shadow_rays, found.meets_light) == meets
+    assert found.reflectance == (GREY[:3] if found.meets_light else (0, 0, 0))
+    assert found.transmittance == (0, 0, 0)
+    assert warnings == ()
+
+
+def test_a_tint_of_shadow_rays_alone_is_told(nodes, read):
+    material, tree = nodes("Fake")
+    mix = tree.link(tree.new("LightPath"), tree.new("MixShader"), "Is Shadow Ray", 0)
+    tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
+    tree.link(tree.new("BsdfTransparent", Color=GREY), mix, 0, 2)
+    tree.show(mix)
+    found, warnings = read(material)
+    assert found.is_opaque
+    assert warnings == ("material 'Fake': shadow rays pass it as light that bounces does",)
+
+
+def test_what_an_object_hides_of_a_material_adds_to_what_its_nodes_do(nodes, add_cube):
+    material, tree = nodes("Fake")
+    mix = tree.link(tree.new("LightPath"), tree.new("MixShader"), "Is Shadow Ray", 0)
+    tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
+    tree.show(tree.link(tree.new("BsdfTransparent"), mix, 0, 2))
+    add_cube("Cube", material).visible_diffuse = False
+    scene = read_scene(bpy.context.scene)
+    found = scene.materials[scene.triangle_materials[0]]
+    assert (found.meets_shadow_rays, found.meets_light) == (False, False)
 
 
 def test_a_strength_may_be_an_image(nodes, read, add_image):
