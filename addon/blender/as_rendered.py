@@ -3,7 +3,7 @@ render would, and set back."""
 
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 import bpy
 
@@ -26,26 +26,27 @@ def as_rendered(bpy_scene, view_layer):
 
     Objects that no render shows may still be there. Afterwards all is as it was.
     """
-    before = []
     hidden = [o for o in view_layer.objects if not o.hide_render and o.hide_get(view_layer=view_layer)]
-    try:
+    with ExitStack() as back:
+        back.callback(view_layer.update)
         for owner, name, value in _differences(bpy_scene, view_layer):
-            before.append((owner, name, getattr(owner, name)))
+            back.callback(_set, owner, name, getattr(owner, name))
             setattr(owner, name, value)
-        _hide(hidden, False, view_layer)
+        for blender_object in hidden:
+            back.callback(_hide, blender_object, view_layer)
+            blender_object.hide_set(False, view_layer=view_layer)
         view_layer.update()
         yield
-    finally:
-        for owner, name, value in reversed(before):
-            setattr(owner, name, value)
-        _hide(hidden, True, view_layer)
-        if before or hidden:
-            view_layer.update()
 
 
-def _hide(objects, is_hidden, view_layer):
-    for blender_object in objects:
-        blender_object.hide_set(is_hidden, view_layer=view_layer)
+def _set(owner, name, value):
+    with suppress(ReferenceError):  # where it is gone
+        setattr(owner, name, value)
+
+
+def _hide(blender_object, view_layer):
+    with suppress(ReferenceError, RuntimeError):  # where it is gone, or no longer in the layer
+        blender_object.hide_set(True, view_layer=view_layer)
 
 
 def _differences(bpy_scene, view_layer):
@@ -54,6 +55,8 @@ def _differences(bpy_scene, view_layer):
     for blender_object in bpy.data.objects:
         if not blender_object.hide_render:
             wanted.append((blender_object, "hide_viewport", False))
+        shows_itself = blender_object.show_instancer_for_render
+        wanted.append((blender_object, "show_instancer_for_viewport", shows_itself))
         for modifier in blender_object.modifiers:
             wanted += _of_modifier(modifier)
     for curve in bpy.data.curves:
@@ -64,7 +67,9 @@ def _differences(bpy_scene, view_layer):
         ]
     wanted += [(ball, "resolution", ball.render_resolution) for ball in bpy.data.metaballs]
     for particles in bpy.data.particles:
-        wanted += [(particles, "display_percentage", 100), (particles, "display_method", "RENDER")]
+        if particles.type == "HAIR":  # others would be simulated anew, in one leap
+            wanted.append((particles, "display_percentage", 100))
+        wanted.append((particles, "display_method", "RENDER"))
         wanted.append((particles, "child_percent", particles.rendered_child_count))
     return [(owner, name, value) for owner, name, value in wanted if getattr(owner, name) != value]
 
@@ -76,9 +81,14 @@ def _simplified(render):
 
 
 def _of_collections(view_layer):
-    """The viewport's switches of a collection and of its place in the layer; a render knows only one."""
-    own = [(collection, "hide_viewport", collection.hide_render) for collection in bpy.data.collections]
-    return own + [(layer, "hide_viewport", False) for layer in _below(view_layer.layer_collection)]
+    """The viewport's switches of a collection and of its place in the layer; a render knows only one.
+
+    None is hidden, which would deselect what is in it.
+    """
+    shown = [collection for collection in bpy.data.collections if not collection.hide_render]
+    own = [(collection, "hide_viewport", False) for collection in shown]
+    layers = _below(view_layer.layer_collection)
+    return own + [(layer, "hide_viewport", False) for layer in layers]
 
 
 def _below(layer_collection):

@@ -50,14 +50,13 @@ def _factor(lamp, frame, warn):
         return NodeFactor(_constant(lamp.node_tree))
     except Unreadable as error:
         why = f"its {error} cannot be read"
-    try:
-        if lamp.type not in SHOWN:
-            raise RenderError("")
-        return _as_shown(lamp, *rendered_lamp(lamp, frame), warn)
-    except RenderError as error:
-        nor = f" nor rendered ({error})" if str(error) else ""
-        warn(f"light '{lamp.name}': {why}{nor}: its own colour and power are used")
-        return UNCHANGED
+    if lamp.type in SHOWN:
+        try:
+            return _as_shown(lamp, *rendered_lamp(lamp, frame), warn)
+        except RenderError as error:
+            why += f" nor rendered ({error})"
+    warn(f"light '{lamp.name}': {why}: its own colour and power are used")
+    return UNCHANGED
 
 
 def _constant(tree):

@@ -34,6 +34,8 @@ class Materials:
             return row
         if (row, is_seen_by) not in self._on_unseen:
             self._on_unseen[row, is_seen_by] = self._add(self.entries[row], self.coordinates[row])
+            if row in self.volumes:
+                self.volumes.add(self._on_unseen[row, is_seen_by])
         return self._on_unseen[row, is_seen_by]
 
     def _own_row(self, material):

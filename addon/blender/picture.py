@@ -13,6 +13,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from .as_rendered import as_rendered
 from .picture_materials import Light, LitMaterials
 from .read_mesh import BAKED_COLOURS, LIGHTMAP_LAYER
 from .rects import in_lightmap, rect_of
@@ -62,7 +63,9 @@ class _SceneCopy:
         self.scene.camera = source.camera
         self.scene.world = source.world
         self.scene.collection.objects.link(source.camera)
-        for shown in self._evaluated_meshes():
+        with as_rendered(bpy.context.scene, bpy.context.view_layer):
+            meshes = self._evaluated_meshes()
+        for shown in meshes:
             self._add(*shown)
 
     def _evaluated_meshes(self):

@@ -78,29 +78,31 @@ def passing_blocks():
         bpy.data.batch_remove(blocks)
 
 
-def adapted_copy(block, io_blocks):
-    """A copy of a material or a world, and of its node groups, as rays from diffuse surfaces meet it: (copy, its
-    trees)."""
+def adapted_copy(block, io_blocks, kept=frozenset()):
+    """A copy of a material, a world or a lamp, and of its node groups, as rays from diffuse surfaces meet it.
+
+    Returns the copy and its trees. ``kept`` are outputs of Light Path nodes that stay as they are.
+    """
     copy = block.copy()
     io_blocks.append(copy)
     trees = [copy.node_tree]
-    _adapt(copy.node_tree, trees)
+    _adapt(copy.node_tree, trees, kept)
     io_blocks += trees[1:]
     return copy, trees
 
 
-def _adapt(tree, io_trees):
+def _adapt(tree, io_trees, kept):
     for node in list(tree.nodes):
         if node.type == "GROUP" and node.node_tree is not None:
             node.node_tree = node.node_tree.copy()
             io_trees.append(node.node_tree)
-            _adapt(node.node_tree, io_trees)
+            _adapt(node.node_tree, io_trees, kept)
         elif node.type == "LIGHT_PATH" and not node.mute:
-            _fix_outputs(tree, node)
+            _fix_outputs(tree, node, kept)
 
 
-def _fix_outputs(tree, light_path):
-    for output in light_path.outputs:
+def _fix_outputs(tree, light_path, kept):
+    for output in [output for output in light_path.outputs if output.name not in kept]:
         value = tree.nodes.new("ShaderNodeValue")
         value.outputs[0].default_value = ON_DIFFUSE_SURFACES.get(output.name, 0.0)
         for link in list(output.links):

@@ -10,7 +10,8 @@ from .shader_nodes import Unreadable
 
 # Bounced light does not see texels finer than this; an 8k texture would cost a gigabyte.
 LONGEST_SIDE = 2048
-RIM = 64
+RIM = 1 / 18  # of a clipped image: so much that some is left where nodes shrink it,
+LEAST_CLIPPED = 16  # and that a side of so many texels has one
 
 LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "scene_linear"}
 
@@ -31,9 +32,15 @@ class Images:
         return self._read_once(image, "alpha", lambda: alpha_pixels(image, self._warn))
 
     def clipped(self, texture) -> Texture:
-        """With black around it, rim_of texels wide."""
-        rim = rim_of(texture)
-        return self._made(texture, "clipped", lambda p: np.pad(p, ((rim, rim), (rim, rim), (0, 0))))
+        """With black around it, RIM of the whole on each side."""
+
+        def clipped(pixels):
+            for axis, side in enumerate(pixels.shape[:2]):
+                pixels = np.repeat(pixels, -(-LEAST_CLIPPED // side), axis=axis)
+            rims = [round(side * RIM / (1 - 2 * RIM)) for side in pixels.shape[:2]]
+            return np.pad(pixels, ((rims[0],) * 2, (rims[1],) * 2, (0, 0)))
+
+        return self._made(texture, "clipped", clipped)
 
     def mirrored(self, texture) -> Texture:
         """Four of it, mirrored at the lines between them."""
@@ -63,11 +70,6 @@ class Images:
         return self._textures[key]
 
 
-def rim_of(texture) -> int:
-    """Texels of black around one that is clipped: enough for some to be left where nodes shrink it."""
-    return 1 + max(texture.pixels.shape[:2]) // RIM
-
-
 def linear_pixels(image, warn) -> np.ndarray:
     """Pixels as float32 (height, width, 3), linear Rec.709, row 0 at the bottom; alpha is ignored."""
     pixels = _rgb(_stored_pixels(image, warn))
@@ -94,12 +96,12 @@ def mean_colour(pixels) -> tuple[float, float, float]:
 
 
 def shrunk(pixels, longest):
-    """Pixels (height, width, channels), box-filtered by a whole factor until no side is longer than ``longest``."""
-    factor = -(-max(pixels.shape[:2]) // longest)
-    if factor == 1:
+    """Pixels (height, width, channels), box-filtered by a whole factor each way until no side is longer than
+    ``longest``."""
+    down, across = (-(-side // longest) for side in pixels.shape[:2])
+    if down == across == 1:
         return np.ascontiguousarray(pixels)
-    height, width = (max(side // factor, 1) for side in pixels.shape[:2])
-    across, down = min(factor, pixels.shape[1]), min(factor, pixels.shape[0])
+    height, width = pixels.shape[0] // down, pixels.shape[1] // across
     blocks = pixels[: height * down, : width * across].reshape(height, down, width, across, -1)
     return np.ascontiguousarray(blocks.mean(axis=(1, 3), dtype=np.float32))
 

@@ -10,13 +10,12 @@ import numpy as np
 from ..core.environment import Environment
 from ..core.scene import AreaLight, PointLight, SunLight
 from .lamp_nodes import node_factors
-from .render_lights import HEIGHT
-from .visibility import seen_by, warn_of_linking
+from .unseen import warn_of_linking
+from .visibility import seen_by
 
 # A hard-edged cone is a very narrow soft one: the smoothstep over it stays finite.
 NARROWEST_CONE_EDGE = 1e-6
-UNEVEN = 1e-4  # apart: scales along a spot's axes
-CONE_ROWS = HEIGHT  # of a profile, to be multiplied by what Cycles shows
+EVEN, FLATTEST = 1e-4, 1e-6  # scales along a spot's axes: apart, and of the largest
 ENOUGH_BOUNCES = 12  # Cycles' own limit for a scene, as Blender sets it
 
 
@@ -39,7 +38,7 @@ def read_lights(depsgraph, visibility, warn) -> tuple:
         if not np.isfinite(matrix).all():
             warn(f"light '{name}' has a transform that is not finite: it is left out")
             continue
-        shape = {"casts_shadow": _casts_shadow(lamp), **_shape(lamp, name, factor, matrix)}
+        shape = {"casts_shadow": _casts_shadow(lamp), **_shape(name, factor, matrix)}
         lights += [replace(light, **shape) for light in READERS[lamp.type](lamp, name, matrix, power, warn)]
     return tuple(lights)
 
@@ -52,16 +51,13 @@ def _shown(depsgraph, visibility):
                 yield instance
 
 
-def _shape(lamp, name, factor, matrix):
-    """Of a point or a spot, what its nodes and an uneven scale make of it, but for its colour."""
-    profile = factor.profile
-    if lamp.type == "SPOT" and _is_uneven(matrix):
-        profile = _cone_profile(lamp, matrix) * (1 if profile is None else profile)
-    if profile is None:
+def _shape(name, factor, matrix):
+    """Of a point or a spot, what its nodes make of it but for its colour."""
+    if factor.profile is None:
         return {"distance_power": factor.distance_power} if factor.distance_power else {}
     left, _, right = np.linalg.svd(matrix[:3, :3])  # the nearest rotation, or reflection
     to_lamp = tuple(_triple(row) for row in (left @ right).T)
-    return {"distance_power": factor.distance_power, "profile": Environment(name, profile, to_lamp)}
+    return {"distance_power": factor.distance_power, "profile": Environment(name, factor.profile, to_lamp)}
 
 
 def _of_cycles(lamp, name, otherwise):
@@ -98,37 +94,34 @@ def _point(lamp, name, matrix, power, warn):
 
 
 def _spot(lamp, name, matrix, power, warn):
+    outer = cos(lamp.spot_size / 2)
+    inner = outer + max((1 - outer) * lamp.spot_blend, NARROWEST_CONE_EDGE)
+    scale = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not scale.min() > FLATTEST * scale.max():
+        warn(f"light '{name}' is scaled to nothing along an axis: it is left out")
+        return []
     return [
         PointLight(
             name,
             _triple(matrix[:3, 3]),
             _triple(_intensity(lamp, power)),
             **_sphere(lamp),
-            direction=_triple(_looks_to(matrix)),
-            **({} if _is_uneven(matrix) else {"cone_cosines": _cone_cosines(lamp)}),
+            cone_cosines=(outer, inner),
+            **(
+                {"direction": _triple(_looks_to(matrix))} if np.ptp(scale) <= EVEN * scale.max() else _stretched(matrix)
+            ),
         )
     ]
 
 
-def _cone_cosines(lamp):
-    outer = cos(lamp.spot_size / 2)
-    return outer, outer + max((1 - outer) * lamp.spot_blend, NARROWEST_CONE_EDGE)
-
-
-def _is_uneven(matrix):
+def _stretched(matrix):
+    """A spot's cone in its own, unevenly scaled space: where it looks and how directions are measured there."""
     scale = np.linalg.norm(matrix[:3, :3], axis=0)
-    return np.ptp(scale) > UNEVEN * scale.max()
-
-
-def _cone_profile(lamp, matrix):
-    """The cone of a spot that is scaled unevenly, which is not round, as NodeFactor.profile."""
-    grid = Environment("", np.zeros((CONE_ROWS, 2 * CONE_ROWS, 3), np.float32))
-    rows, columns = np.indices(grid.pixels.shape[:2])
-    within = grid.directions(rows, columns) / np.linalg.norm(matrix[:3, :3], axis=0)
-    cosines = -within[..., 2] / np.linalg.norm(within, axis=-1)
-    outer, inner = _cone_cosines(lamp)
-    t = np.clip((cosines - outer) / (inner - outer), 0, 1)
-    return np.repeat((t * t * (3 - 2 * t))[..., None], 3, axis=2).astype(np.float32)
+    axes = matrix[:3, :3] / scale
+    scale = scale / scale[2]  # only ratios count
+    metric = (axes / scale**2) @ axes.T
+    measured = tuple(float(metric[row, column]) for row, column in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    return {"direction": _triple(-axes[:, 2]), "cone_metric": measured}
 
 
 def _intensity(lamp, power):

@@ -14,9 +14,9 @@ from ..core.scene import BRIGHTEST, Material
 from .colour_nodes import grey, read_colour_node
 from .mesh_colours import MeshColours
 from .private_render import ON_DIFFUSE_SURFACES
-from .read_images import mean_colour, rim_of
+from .read_images import RIM, mean_colour
 from .read_mesh import BAKED_COLOURS
-from .render_colours import ShaderInput
+from .render_colours import ShaderInput, feeding
 from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, output_input, surface_shader
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
@@ -62,9 +62,11 @@ class Notes:
 
     def __init__(self):
         self.coordinates, self.sentences, self.guesses = {}, {}, {}
+        self.asked = set()  # what else might see it in another way: "back", "shadow rays"
 
     def add(self, other) -> None:
         self.coordinates |= other.coordinates
+        self.asked |= other.asked
         self.sentences |= other.sentences
         self.guesses |= other.guesses
 
@@ -83,15 +85,15 @@ class MaterialReading:
         self._images = images
         self._notes = Notes()
         self._read = {}
-        self._takes_mesh_colours = True
+        self._takes_mesh_colours, self._all_repeat = True, False
         self.is_volume = False  # and no surface
-        self._sees, self._asked = sees, set()  # and which else might see it in another way
+        self._sees = sees
 
     def material(self) -> Material:
         """The core material; never silently black."""
         made = self._seen_so()
         for sees, combined in (("back", two_sided), ("shadow rays", as_shadow_rays_see)):
-            if sees in self._asked:
+            if sees in self._notes.asked:
                 reading = MaterialReading(self.blender_material, self._images, self._told, sees)
                 made = combined(made, reading._seen_so(), self.say)
                 self.guessed |= reading.guessed
@@ -104,6 +106,10 @@ class MaterialReading:
             # a triangle has one place in textures: its image's
             self._takes_mesh_colours, self._notes, self._read, self.guessed = False, Notes(), {}, {}
             surface = self._surface()
+        if len(self._notes.coordinates) > 1 and len(set(self._notes.coordinates.values())) == 1:
+            self._all_repeat, self._notes, self._read, self.guessed = True, Notes(), {}, {}
+            surface = self._surface()
+            self.say("its images go on in several ways beyond their edges: all are repeated there")
         surface, is_dimmed = surface.without_gain()
         if is_dimmed:
             self.say("its shaders send on more light than they get: they are dimmed")
@@ -279,9 +285,11 @@ class MaterialReading:
             inner, self._notes = self._notes, outer
         # what the view decides has no mean, and the names of nodes in groups say nothing outside
         is_guess = inner.guesses or (unreadable and reached.node.type not in BY_VIEW)
+        if is_guess and any(_tells_sides_apart(node) for node in feeding(reached.node)):
+            inner.asked.add("back")
         if is_guess and not shader.groups:
             self.guessed[place] = True
-            if place in self._told:
+            if place in self._told and self._sees not in inner.asked:  # a tile shows fronts, to light that bounces
                 inner.guesses = {f"its {socket.name} is what Cycles shows of it, on the mean of a square metre": True}
                 found, unreadable = _with_mean(found, self._told[place]), None
         self._notes.add(inner)
@@ -310,11 +318,11 @@ class MaterialReading:
         if reached.is_constant or reached.node.type in {"RGB", "VALUE"}:
             return Colour(constant_colour(reached))
         if reached.node.type == "LIGHT_PATH" and reached.socket.name in KINDS_OF_RAYS:
-            self._asked.add("shadow rays")
+            self._notes.asked.add("shadow rays")
             values = OF_SHADOW_RAYS if self._sees == "shadow rays" else ON_DIFFUSE_SURFACES
             return Colour(np.full(3, values.get(reached.socket.name, 0.0)))
         if reached.node.type == "NEW_GEOMETRY" and reached.socket.identifier == "Backfacing":
-            self._asked.add("back")
+            self._notes.asked.add("back")
             return Colour(np.full(3, float(self._sees == "back")))
         if reached.node.type == "TEX_IMAGE":
             return self._image_colour(reached)
@@ -334,7 +342,7 @@ class MaterialReading:
             raise Unreadable(f"{reached.node.bl_label} node")
         if not attribute and reached.node.type == "ATTRIBUTE":
             return Colour(np.zeros(3))  # as Cycles has it; a Color Attribute node takes the render colours
-        self._notes.coordinates[MeshColours(attribute)] = True
+        self._notes.coordinates[MeshColours(attribute)] = MeshColours(attribute)
         return Colour(np.ones(3), self._images.of_meshes())
 
     def _image_colour(self, reached) -> Colour:
@@ -349,8 +357,9 @@ class MaterialReading:
         except Unreadable as error:
             self.say(f"its image '{node.image.name}' uses {error}: the image's mean colour is used")
             return Colour(np.array(mean_colour(texture.pixels)))
-        texture, coordinates = self._beyond_its_edges(node.extension, texture, coordinates)
-        self._notes.coordinates[coordinates] = True
+        extension = "REPEAT" if self._all_repeat else node.extension
+        texture, looked_up = self._beyond_its_edges(extension, texture, coordinates)
+        self._notes.coordinates[looked_up] = coordinates
         return Colour(np.ones(3), texture)
 
     def _beyond_its_edges(self, extension, texture, coordinates):
@@ -358,10 +367,7 @@ class MaterialReading:
         if extension == "EXTEND":
             return texture, replace(coordinates, extends=True)
         if extension == "CLIP":
-            height, width = texture.pixels.shape[:2]
-            rim = rim_of(texture)
-            across, down = rim / (width + 2 * rim), rim / (height + 2 * rim)
-            return self._images.clipped(texture), coordinates.of_part((across, down), (1 - across, 1 - down), True)
+            return self._images.clipped(texture), coordinates.of_part((RIM, RIM), (1 - RIM, 1 - RIM), True)
         if extension == "MIRROR":
             return self._images.mirrored(texture), coordinates.of_part((0, 0), (0.5, 0.5), False)
         return texture, coordinates
@@ -376,6 +382,10 @@ class MaterialReading:
     def guess(self, sentence):
         """Note for the report what has to be guessed, unless it is told."""
         self._notes.guesses[sentence] = True
+
+
+def _tells_sides_apart(node):
+    return node.type == "NEW_GEOMETRY" and node.outputs["Backfacing"].is_linked
 
 
 def _with_mean(colour: Colour | None, mean) -> Colour:

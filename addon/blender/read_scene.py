@@ -25,10 +25,10 @@ from .rects import in_lightmap, rect_of
 from .shared_meshes import SharedMeshes, why_not_without
 from .targets import has_faces_of, why_not_modified, why_not_target
 from .texture_coordinates import Coordinates
-from .visibility import Visibility, seen_by, warn_of_linking
+from .unseen import KINDS, say_what_is_unseen
+from .visibility import Visibility, seen_by
 
 DEFAULTS = BakeSettings()
-UNSEEN = {"VOLUME": "a volume", "CURVES": "hair", "POINTCLOUD": "a point cloud"}
 
 
 class Warnings:
@@ -103,15 +103,17 @@ class SceneReading:
             if instance.object.original.hide_render:
                 continue
             name = instance.object.name
-            if instance.object.type in UNSEEN and self.visibility.shows(instance):
-                unseen[name] = UNSEEN[instance.object.type]
+            if instance.object.type in KINDS and self.visibility.shows(instance):
+                unseen[name] = KINDS[instance.object.type]
             if instance.object.type != "MESH":
                 continue
             number, entries[name] = entries[name], entries[name] + 1
             if self.visibility.shows(instance):
                 self._read_instance(instance, f"{name}#{number}" if instance.is_instance else name, shared)
-        for name in unseen.keys() - entries.keys():  # nodes may make meshes of them
+        for name in sorted(unseen.keys() - entries.keys()):  # nodes may make meshes of them
             self.warn(f"'{name}' is {unseen[name]}: the bake does not see it")
+        for name in self.visibility.missing_names():
+            self.warn(f"'{name}' stays hidden in the viewport, by what drives it: the bake does not see it")
         self._spare_other_lightmaps(shared)
         self._require_targets()
 
@@ -149,6 +151,7 @@ class SceneReading:
 
     def _read_instance(self, instance, name, shared):
         evaluated = instance.object
+        say_what_is_unseen(evaluated, self.warn)
         matrix = np.array(instance.matrix_world, np.float64)
         mesh = evaluated.to_mesh()
         try:
@@ -170,10 +173,6 @@ class SceneReading:
             self.warn(self.refusals[name])
             self.new_meshes.forget(name)
             return
-        warn_of_linking(evaluated, self.warn)
-        for system in evaluated.particle_systems:
-            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
-                self.warn(f"'{name}' has hair, '{system.name}': the bake does not see it")
         for attribute, values in arrays.colours.items():
             if values.max(initial=0.0) > 1:
                 self.warn(f"'{name}': colours of its attribute '{attribute}' above 1 are read as 1")

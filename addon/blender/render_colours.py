@@ -64,7 +64,7 @@ def _show(material, trees, which) -> bool:
     tree = material.node_tree
     (wanted,) = (socket for socket in tree.nodes[which.node].inputs if socket.identifier == which.socket)
     link = next((link for link in wanted.links if link.is_valid and not link.is_muted), None)
-    if link is None or not all(_can_be_shown(node) for node in _feeding(link.from_node)):
+    if link is None or not all(_can_be_shown(node) for node in feeding(link.from_node)):
         return False
     for node in [node for tree in trees for node in tree.nodes]:
         if node.type == "UVMAP":
@@ -91,7 +91,7 @@ def _can_be_shown(node):
     return not differs and not why_not_shown(node)
 
 
-def _feeding(node):
+def feeding(node):
     """The node and all that feed it, those in groups too."""
     found, waiting = {}, [node]
     while waiting:

@@ -14,6 +14,7 @@ import numpy as np
 from ..core.lightmap import bilinear
 from ..core.relative import DARK
 from ..core.scene import exitance_from_radiance
+from .as_rendered import as_rendered
 from .files import FileError
 from .read_mesh import LIGHTMAP_LAYER
 from .rects import in_lightmap, rect_of
@@ -84,16 +85,20 @@ def score(reference: dict[str, np.ndarray]) -> Score:
 
 def _baked_irradiance(reference):
     """Irradiance (N, 3) [W/m^2] that a viewer finds at the points, NaN where nothing is baked."""
-    graph = bpy.context.evaluated_depsgraph_get()
     found = np.full((len(reference["object"]), 3), np.nan)
     size = np.linalg.norm(np.ptp(reference["position"], axis=0))
+    with as_rendered(bpy.context.scene, bpy.context.view_layer):
+        return exitance_from_radiance(_looked_up(bpy.context.evaluated_depsgraph_get(), reference, found, size))
+
+
+def _looked_up(graph, reference, found, size):
     instances = _instances(graph)
     for name in np.unique(reference["object"]):
         if str(name) in instances:
             rows = np.flatnonzero(reference["object"] == name)
             part = {key: array[rows] for key, array in reference.items()}
             found[rows] = _on_object(graph, *instances[str(name)], part, MOVED * size)
-    return exitance_from_radiance(found)
+    return found
 
 
 def _instances(graph):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+RENDERED_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "VOLUME", "CURVES", "LIGHT"}
+
 
 class Visibility:
     """Render visibility in one view layer, of which the depsgraph has more."""
@@ -17,8 +19,9 @@ class Visibility:
         if blender_object.hide_render:
             return False
         if instance.is_instance:
-            parent = instance.parent.original
-            return not parent.hide_render and parent.name in self._rendered
+            parent, of = instance.parent.original, blender_object.users_collection
+            is_left_out = of and all(collection.hide_render for collection in of)
+            return not parent.hide_render and parent.name in self._rendered and not is_left_out
         if blender_object.is_instancer and not blender_object.show_instancer_for_render:
             return False
         return blender_object.name in self._rendered
@@ -26,6 +29,17 @@ class Visibility:
     def hidden_names(self) -> set[str]:
         """Objects of the view layer that no render shows."""
         return {o.name for o in self._view_layer.objects if o.hide_render or o.name not in self._rendered}
+
+    def missing_names(self) -> list[str]:
+        """Objects that a render shows but the depsgraph does not have, as something else has hidden them."""
+        return [
+            o.name
+            for o in self._view_layer.objects
+            if o.type in RENDERED_TYPES
+            and o.name in self._rendered
+            and not o.hide_render
+            and not o.visible_get(view_layer=self._view_layer)
+        ]
 
     def _collect(self, layer_collection):
         if layer_collection.exclude or layer_collection.collection.hide_render:
@@ -39,10 +53,3 @@ def seen_by(instance) -> tuple[bool, bool]:
     """Whether shadow rays and light that bounces meet an entry of ``depsgraph.object_instances``, as Cycles has it."""
     shown = [instance.object, *([instance.parent] if instance.is_instance else [])]
     return all(each.visible_shadow for each in shown), all(each.visible_diffuse for each in shown)
-
-
-def warn_of_linking(blender_object, warn) -> None:
-    """Say that an object is to light, or to hide light from, a collection only."""
-    linking = getattr(blender_object, "light_linking", None)  # none before Blender 4.0
-    if linking and (linking.receiver_collection or linking.blocker_collection):
-        warn(f"'{blender_object.name}': its light linking is not read: it lights all, and all hide it")

@@ -11,7 +11,7 @@ from .scene import AreaLight, PointLight, Scene, SunLight
 from .textures import textured_colours
 
 POINT, AREA, SUN, MESH = 0, 1, 2, 3
-LIGHT_FLOATS, PROFILE_SIDE = 20, 128  # PL_LIGHT_FLOATS, PL_PROFILE_SIDE
+LIGHT_FLOATS, PROFILE_SIDE = 24, 128  # PL_LIGHT_FLOATS, PL_PROFILE_SIDE
 PROFILE_AT = 13  # in a point's row: the number of its profile, 0 for none
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -102,7 +102,7 @@ def _light_row(light, centre):
         position = np.asarray(light.position) - centre
         soft = float(light.soft_falloff and light.radius > 0)
         shape = [light.radius, soft, *light.direction, *light.cone_cosines]
-        return POINT, [*position, *light.intensity, *shape, 0.0, light.distance_power]
+        return POINT, [*position, *light.intensity, *shape, 0.0, light.distance_power, *light.cone_metric]
     if isinstance(light, AreaLight):
         position = np.asarray(light.centre) - centre
         shape = [float(light.is_ellipse), light.spread]
@@ -138,6 +138,10 @@ def _glowing_triangles(scene):
         for of_back in ([False, True] if has_backs else [False])
     ]
     radiances = np.concatenate([sides[0], sides[-1]], axis=1)
+    owners = np.concatenate([plain, np.repeat(cut, len(weights))])
+    open_sides = np.array([m.open_side or "" for m in scene.materials])[scene.triangle_materials[owners]]
+    radiances[open_sides == "front", :3] = 0
+    radiances[open_sides == "back", 3:] = 0
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     keep = (areas > 0) & (radiances.max(axis=1, initial=0.0) > 0) & _is_first(corners)
     return corners[keep], radiances[keep]

@@ -24,7 +24,8 @@ class Laws:
     Attributes
     ----------
     closure : of the flux that a group sends, the share that neither lands nor leaves the scene: the largest of the
-        groups. 0 but for what tinted glass takes, and noise of what is coloured by passing cloth
+        groups. 0 but for what tinted glass takes, and noise of what is coloured by passing cloth; where one side of a
+        surface is open, what lands and goes on counts twice, and light has no way back
     reciprocity : sum over pairs of groups of |A_i F_ij - A_j F_ji|, relative to the sum of A_i F_ij + A_j F_ji: 0 but
         for noise, a per cent or two
     """

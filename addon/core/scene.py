@@ -197,7 +197,8 @@ class PointLight:
     smoothstep between; ``direction`` is where it looks. ``soft_falloff``: a disc that always faces the receiver, as
     Cycles does it. ``profile``: what the intensity is multiplied by in each direction, the first channel of what would
     be seen there from the light; None = 1. ``distance_power``: what it gives is multiplied by this power of the
-    distance [m]; 0 = the square law.
+    distance [m]; 0 = the square law. ``cone_metric``: of a cone that is a round one stretched, whose cosine of d is
+    d . direction / sqrt(d . metric d); zeros = a round one.
     """
 
     name: str
@@ -210,9 +211,11 @@ class PointLight:
     casts_shadow: bool = True  # False = it shines through everything
     profile: Environment | None = None
     distance_power: float = 0.0
+    cone_metric: tuple[float, ...] = (0.0,) * 6  # xx, yy, zz, xy, xz, yz
 
     def __post_init__(self):
         owner = f"light {self.name}"
+        require_vector(owner, "cone_metric", self.cone_metric, LARGEST_COORDINATE, count=6)
         require_vector(owner, "position", self.position)
         require_colour(owner, "intensity", self.intensity, BRIGHTEST)
         require_number(owner, "radius", self.radius, 0.0, LARGEST_COORDINATE)

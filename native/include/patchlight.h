@@ -200,7 +200,7 @@ void pl_openness(const pl_scene *scene, const pl_patches *patches, const float *
  *   io_received    3 * 2 * patch_count: what has landed, added to atomically; integers, so that the sum
  *                  does not depend on the order
  *   io_escaped     3: what left the scene, or met an open side: what meets the other side lands and goes on, as rays
- * that look back along it would have it
+ *                  that look back along it would have it
  */
 void pl_shoot(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t side_count,
               const uint64_t *first_rays, const uint32_t *first_samples, const uint64_t *ray_flux, uint64_t first,
@@ -229,7 +229,8 @@ typedef struct pl_receivers {
  * A row of `parameters` (PL_LIGHT_FLOATS floats) for each light, by kind:
  *   POINT  position, intensity, radius, is_soft (1 = disc that faces the receiver), direction, cone cosines
  *          outer and inner (-2, -2: no cone), its profile (0: none, else the k-th has the number k), power of the
- *          distance [m] that the light is multiplied by (0 is the square law, 2 none)
+ *          distance [m] that the light is multiplied by (0 is the square law, 2 none); the cone's metric, xx, yy, zz,
+ *          xy, xz, yz (0: a round one): the cosine of d is d . direction / sqrt(d . metric d)
  *   AREA   centre, radiance, axis u (half side), axis v (half side), is_ellipse, spread (full angle)
  *   SUN    direction to the sun, irradiance, angular radius
  *   MESH   centre, bounding radius, flux-like weight (sum of area * radiance) for choosing; first and
@@ -242,7 +243,7 @@ typedef struct pl_receivers {
  * Positions are relative to `centre`, which the scene was re-centred by: pl_scene_centre.
  */
 enum { PL_LIGHT_POINT = 0, PL_LIGHT_AREA = 1, PL_LIGHT_SUN = 2, PL_LIGHT_MESH = 3 };
-enum { PL_LIGHT_FLOATS = 20, PL_PROFILE_SIDE = 128 };
+enum { PL_LIGHT_FLOATS = 24, PL_PROFILE_SIDE = 128 };
 typedef struct pl_lights {
     const int32_t *kinds;
     const float *parameters;

@@ -20,6 +20,7 @@ typedef struct point_light {
     float cos_outer, cos_inner;
     const float *profile; /* NULL: the same in all directions */
     float distance_power;
+    const float *metric; /* of a cone that is not round, else NULL */
 } point_light;
 
 typedef struct area_light {
@@ -49,7 +50,9 @@ static inline point_light point_of(const pl_lights *lights, size_t light) {
     const float *p = parameters_of(lights, light);
     const float *profile =
         p[13] >= 1 ? lights->profiles + (size_t)PL_PROFILE_SIDE * PL_PROFILE_SIDE * ((size_t)p[13] - 1) : NULL;
-    return (point_light){vec3_from(p), vec3_from(p + 3), p[6], p[7], vec3_from(p + 8), p[11], p[12], profile, p[14]};
+    const float *metric = p[15] > 0 ? p + 15 : NULL;
+    return (point_light){vec3_from(p), vec3_from(p + 3), p[6],  p[7],  vec3_from(p + 8), p[11],
+                         p[12],        profile,          p[14], metric};
 }
 
 /* Whether a point light gives the same all round, by the square law. */

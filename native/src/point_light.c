@@ -2,11 +2,18 @@
 #include "light_kinds.h"
 #include "sky.h"
 
+static float squared_by(const float m[6], vec3 d) {
+    return m[0] * d.x * d.x + m[1] * d.y * d.y + m[2] * d.z * d.z +
+           2 * (m[3] * d.x * d.y + m[4] * d.x * d.z + m[5] * d.y * d.z);
+}
+
 /* Smoothstep from the cone's edge inwards. */
 static float cone_share(const point_light *light, vec3 from_light) {
     if (light->cos_inner < -1)
         return 1;
-    const float cosine = vec3_dot(from_light, light->direction);
+    float cosine = vec3_dot(from_light, light->direction);
+    if (light->metric)
+        cosine /= sqrtf(greater(squared_by(light->metric, from_light), 1e-30f));
     const float range = greater(light->cos_inner - light->cos_outer, 1e-6f);
     const float t = lesser(greater((cosine - light->cos_outer) / range, 0), 1);
     return t * t * (3 - 2 * t);
@@ -107,14 +114,14 @@ bool sample_point_light(const point_light *light, vec3 point, vec3 normal, float
         const float square = vec3_dot(out->direction, out->direction), reach = sqrtf(square);
         const float cosine = vec3_dot(out->direction, normal) / reach;
         factor = cosine * (distance / reach) / square;
-        factor *= share_of_intensity(light, vec3_scale(out->direction, -1 / reach), distance);
+        factor *= share_of_intensity(light, vec3_scale(out->direction, -1 / reach), reach);
     } else {
         /* a sphere of radiance P / (4 pi^2 r^2) = I / (pi r^2), times its solid angle: r^2 cancels, however small */
         float over_disc;
         if (!sample_sphere(light, to, distance, x, y, &out->direction, &out->far, &over_disc))
             return false;
         factor = vec3_dot(out->direction, normal) * over_disc;
-        factor *= share_of_intensity(light, vec3_scale(out->direction, -1), distance);
+        factor *= share_of_intensity(light, vec3_scale(out->direction, -1), out->far);
     }
     out->irradiance[0] = light->intensity.x * factor;
     out->irradiance[1] = light->intensity.y * factor;

@@ -121,3 +121,43 @@ def test_all_is_set_back_where_reading_fails(add_cube):
     with pytest.raises(ZeroDivisionError):
         fail()
     assert cube.hide_viewport
+
+
+def test_all_that_is_still_there_is_set_back(add_cube):
+    """Handlers of others run while a scene is read, and may remove what was to be set back."""
+    gone, kept, closed = (add_cube(name) for name in ("Gone", "Kept", "Closed"))
+    gone.hide_viewport = kept.hide_viewport = True
+    closed.hide_set(True)
+    with as_rendered(bpy.context.scene, bpy.context.view_layer):
+        bpy.data.objects.remove(gone)
+    assert kept.hide_viewport
+    assert closed.hide_get()
+
+
+def test_what_was_selected_still_is(add_cube, collection):
+    cube = add_cube()
+    collection.objects.link(cube)
+    collection.hide_render = True
+    cube.select_set(True)
+    with as_rendered(bpy.context.scene, bpy.context.view_layer):
+        pass
+    assert cube.select_get()
+
+
+def test_what_stays_hidden_or_asks_for_the_viewport_is_told(add_cube):
+    add_cube("Room")
+    driven = add_cube("Driven")
+    driven.driver_add("hide_viewport").driver.expression = "1"
+    asking = add_cube("Asking")
+    tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    asks, switch, out = (
+        tree.nodes.new(kind) for kind in ("GeometryNodeIsViewport", "GeometryNodeSwitch", "NodeGroupOutput")
+    )
+    tree.links.new(asks.outputs[0], switch.inputs[0])
+    tree.links.new(switch.outputs[0], out.inputs[0])
+    asking.modifiers.new("Nodes", "NODES").node_group = tree
+    bpy.context.view_layer.update()
+    warnings = read_scene(bpy.context.scene, BakeSettings()).warnings
+    assert "'Driven' stays hidden in the viewport, by what drives it: the bake does not see it" in warnings
+    assert "'Asking': Nodes asks whether it is for the viewport, and is read as if it were" in warnings

@@ -237,12 +237,19 @@ def one_sided(add_mesh, nodes):
     """A panel that glows in front, a wall that is nothing from behind, in the sun, and a board of two colours."""
     warm, cold = ("BsdfDiffuse", {"Color": (0.7, 0.4, 0.1, 1)}), ("BsdfDiffuse", {"Color": (0.1, 0.3, 0.7, 1)})
     glow, nothing = ("Emission", {"Strength": 4.0}), ("BsdfTransparent", {})
-    both = {"panel": (glow, cold), "wall": (warm, nothing), "cut": (nothing, cold), "board": (warm, cold)}
+    both = {
+        "panel": (glow, cold),
+        "wall": (warm, nothing),
+        "cut": (nothing, cold),
+        "board": (warm, cold),
+        "sign": (glow, nothing),
+    }
     places = {  # corner, and two sides
         "panel": ((0.5, 2.5, 1.5), (0, 1, 0), (1, 0, 0)),
         "wall": ((0, 0, 0), (4, 0, 0), (0, 0, 3)),
         "cut": ((0.4, 0.5, 0.6), (0, 1.5, 0), (0, 0, 1.5)),
         "board": ((3.5, 0.5, 0.6), (0, 2, 0), (0, 0, 1.5)),
+        "sign": ((2, 1, 0.8), (0, 0.6, 0), (0, 0, 0.6)),
     }
     for name, shaders in both.items():
         material, tree = nodes(name)

@@ -225,21 +225,100 @@ def test_light_falloff_is_a_power_of_the_distance(add_lamp, read, output, power)
     assert not scene.warnings
 
 
-def test_several_powers_of_the_distance_are_told(add_lamp, read):
+@pytest.mark.parametrize("how", ["two powers", "smooth", "a minimum"])
+def test_what_is_no_power_of_the_distance_is_told(add_lamp, read, how):
     tree, emission = nodes_of(add_lamp("POINT", "Both", energy=4 * pi))
-    falloff, added = tree.nodes.new("ShaderNodeLightFalloff"), tree.nodes.new("ShaderNodeMath")
-    for k, output in enumerate(("Linear", "Constant")):
-        tree.links.new(falloff.outputs[output], added.inputs[k])
-    tree.links.new(added.outputs[0], emission.inputs["Strength"])
+    falloff, made = tree.nodes.new("ShaderNodeLightFalloff"), tree.nodes.new("ShaderNodeMath")
+    made.operation = "MINIMUM" if how == "a minimum" else "ADD"
+    falloff.inputs["Strength"].default_value = 1.0
+    falloff.inputs["Smooth"].default_value = 1.0 if how == "smooth" else 0.0
+    made.inputs[1].default_value = 1.5 if how == "a minimum" else 0.0  # which it has from 1.5 m on
+    tree.links.new(falloff.outputs["Linear"], made.inputs[0])
+    if how == "two powers":
+        tree.links.new(falloff.outputs["Constant"], made.inputs[1])
+    tree.links.new(made.outputs[0], emission.inputs["Strength"])
     (light,), scene = read()
     np.testing.assert_allclose(light.intensity, 1.0, rtol=FLOAT32)
-    assert any("'Both'" in said and "mix several powers" in said for said in scene.warnings)
+    assert any("'Both'" in said and "does not go by a power of the distance" in said for said in scene.warnings)
+
+
+def test_a_falloff_that_leads_nowhere_is_none(add_lamp, read):
+    tree, emission = nodes_of(add_lamp("POINT", energy=4 * pi))
+    falloff, nowhere = tree.nodes.new("ShaderNodeLightFalloff"), tree.nodes.new("ShaderNodeMath")
+    tree.links.new(falloff.outputs["Constant"], nowhere.inputs[0])
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Fac"], emission.inputs["Strength"])
+    (light,), _ = read()
+    assert light.distance_power == 0
+
+
+def test_the_length_of_a_ray_is_a_power_of_the_distance(add_lamp, read):
+    tree, emission = nodes_of(add_lamp("POINT", energy=4 * pi))
+    path = tree.nodes.new("ShaderNodeLightPath")
+    tree.links.new(path.outputs["Ray Length"], emission.inputs["Strength"])
+    (light,), scene = read()
+    np.testing.assert_allclose(light.intensity, 1.0, rtol=1e-3)
+    assert light.distance_power == 1
+    assert not scene.warnings
+
+
+def test_what_animates_a_lamp_counts_once(add_lamp, read):
+    """Its energy and colour are read as the frame has them; the ball is lit by a lamp that nothing animates."""
+    lamp = add_lamp("POINT", energy=4 * pi, color=COLOUR)
+    with_profile(lamp)
+    for path in ("energy", "color"):
+        lamp.data.keyframe_insert(path, frame=1)
+    (light,), _ = read()
+    lamp.data.animation_data_clear()
+    (still,), _ = read()
+    np.testing.assert_allclose(light.intensity, still.intensity, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("kind", "output"), [("ShaderNodeNewGeometry", "Normal"), ("ShaderNodeObjectInfo", "Random")])
+def test_nodes_that_ask_where_a_lamp_stands_are_told(add_lamp, read, kind, output):
+    tree, emission = nodes_of(add_lamp("POINT", "There", energy=4 * pi))
+    tree.links.new(tree.nodes.new(kind).outputs[output], emission.inputs["Color"])
+    (light,), scene = read()
+    np.testing.assert_allclose(light.intensity, 1.0, rtol=FLOAT32)
+    assert any("'There'" in said and "asks where it stands" in said for said in scene.warnings)
+
+
+def test_a_photometric_file_that_is_missing_is_told(add_lamp, read):
+    tree, emission = nodes_of(add_lamp("POINT", "Lost", energy=4 * pi))
+    node = tree.nodes.new("ShaderNodeTexIES")
+    node.mode, node.filepath = "EXTERNAL", "//nowhere.ies"
+    tree.links.new(node.outputs[0], emission.inputs["Strength"])
+    (light,), scene = read()
+    np.testing.assert_allclose(light.intensity, 1.0, rtol=FLOAT32)
+    assert any("'Lost'" in said and "has no file" in said for said in scene.warnings)
+
+
+def test_a_spot_that_is_scaled_unevenly_has_a_stretched_cone(add_lamp, read):
+    """In its own space the cone is round: directions (x, y, z) there are (x / sx, y / sy, z / sz)."""
+    add_lamp("SPOT", rotation=(0.4, 0.3, 0.2), spot_size=radians(60)).scale = (2.0, 1.0, 0.5)
+    (light,), _ = read()
+    lamp = bpy.data.objects["Lamp"]
+    matrix = np.array(lamp.matrix_world)[:3, :3]
+    towards = np.random.default_rng(0).normal(size=(20, 3))
+    xx, yy, zz, xy, xz, yz = light.cone_metric
+    metric = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    own = np.linalg.solve(matrix, towards.T).T
+    expected = -own[:, 2] / np.linalg.norm(own, axis=1)
+    found = towards @ light.direction / np.sqrt(np.einsum("ni,ij,nj->n", towards, metric, towards))
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    assert light.profile is None
+
+
+def test_a_spot_that_is_flat_is_left_out(add_lamp, read):
+    add_lamp("SPOT", "Flat").scale = (1.0, 1.0, 0.0)
+    lights, scene = read()
+    assert lights == ()
+    assert "light 'Flat' is scaled to nothing along an axis: it is left out" in scene.warnings
 
 
 def test_a_colour_that_differs_by_direction_is_told(add_lamp, read):
     tree, emission = nodes_of(add_lamp("POINT", "Disco", energy=4 * pi))
-    geometry = tree.nodes.new("ShaderNodeNewGeometry")
-    tree.links.new(geometry.outputs["Normal"], emission.inputs["Color"])
+    place = tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(place.outputs["Normal"], emission.inputs["Color"])
     lights, scene = read()
     assert len(lights) == 1
     assert any("'Disco': its colour differs by direction" in said for said in scene.warnings)

@@ -8,6 +8,7 @@ import pytest
 
 from addon.blender.read_scene import read_scene
 from addon.core.scene import SceneError
+from addon.core.textures import lookup
 
 pytestmark = pytest.mark.usefixtures("empty_file")
 
@@ -372,9 +373,9 @@ def test_a_large_image_is_shrunk_without_changing_its_mean(nodes, read, add_imag
         )
     )
     texture = read(material)[0].reflectance_texture.pixels
-    assert texture.shape == (1, 1366, 3)
-    # 4100 = 3 x 1366 + 2 columns: at most the last two and the fourth row are left out
-    np.testing.assert_allclose(texture.mean(axis=(0, 1)), pixels[:3, :4098].mean(axis=(0, 1)), rtol=1e-5)
+    assert texture.shape == (4, 1366, 3)
+    # 4100 = 3 x 1366 + 2 columns: the last two are left out
+    np.testing.assert_allclose(texture.mean(axis=(0, 1)), pixels[:, :4098].mean(axis=(0, 1)), rtol=1e-5)
 
 
 def test_a_volume_alone_lets_all_light_pass_and_is_not_baked(nodes, add_cube):
@@ -410,3 +411,37 @@ def test_a_material_override_takes_the_place_of_all(nodes, add_cube):
     scene = read_scene(bpy.context.scene)
     (used,) = np.unique(scene.triangle_materials)
     assert scene.materials[used].name == "clay"
+
+
+@pytest.mark.parametrize("size", [(4, 2048), (8, 100), (300, 300), (1, 1)])
+def test_a_clipped_image_is_all_there_however_thin(nodes, read, add_image, size):
+    """White within, through a node that shrinks it; black from a texel beyond its edges on."""
+    material, tree = nodes()
+    image = image_node(tree, add_image(np.ones((*size, 3), np.float32), is_float=True, space="Non-Color"))
+    image.extension = "CLIP"
+    gamma = tree.link(image, tree.new("Gamma", Gamma=1.0), "Color", "Color")
+    tree.show(tree.link(gamma, tree.new("BsdfDiffuse"), 0, "Color"))
+    found, _ = read(material)
+    assert found.textures_extend
+    texel = 1 / np.minimum(np.maximum(size[::-1], 16), 256)  # which nodes leave
+    within = np.array([(0.5, 0.5), 1.5 * texel, 1 - 1.5 * texel])
+    beyond = np.array([(0.5, -1.5 * texel[1]), (1 + 1.5 * texel[0], 0.5), (5.0, 0.5)])
+    for places, value in ((within, 1.0), (beyond, 0.0)):
+        places = (1 / 18 + places * 16 / 18) * found.reflectance[0]
+        np.testing.assert_allclose(lookup(found.reflectance_texture, places, True), value, atol=1e-6)
+
+
+def test_images_that_end_in_several_ways_share_their_coordinates(nodes, read, add_image):
+    material, tree = nodes("decal")
+    colour = image_node(tree, add_image(checker(), "a", is_float=True, space="Non-Color"))
+    share = image_node(tree, add_image(checker(), "b", is_float=True, space="Non-Color"))
+    share.extension = "CLIP"
+    mix = tree.link(share, tree.new("MixShader"), "Color", 0)
+    tree.link(tree.new("BsdfTransparent"), mix, 0, 1)
+    tree.show(tree.link(tree.link(colour, tree.new("BsdfDiffuse"), "Color", "Color"), mix, 0, 2))
+    found, warnings = read(material)
+    assert not found.textures_extend
+    assert found.transmittance_texture.pixels.shape == checker().shape
+    assert warnings == (
+        "material 'decal': its images go on in several ways beyond their edges: all are repeated there",
+    )

@@ -98,3 +98,26 @@ def test_what_one_material_cannot_be_is_told(read):
     found, said = read(diffuse(WARM), translucent)
     assert found.back is None
     assert said == ("material 'sides': it is translucent: its back is taken to be as its front",)
+
+
+def test_a_lamp_in_front_and_nothing_behind(read):
+    found, said = read(glow(4.0), nothing)
+    assert (found.radiance, found.open_side) == ((4, 4, 4), "back")
+    assert said == ()
+
+
+def test_a_mean_that_cycles_tells_is_of_the_front(nodes, add_cube):
+    """Of a mix by noise times Backfacing a tile shows the front, where the first shader is all."""
+    material, tree = nodes("sides")
+    mix, product = tree.new("MixShader"), tree.new("Math")
+    product.operation = "MULTIPLY"
+    tree.link(tree.new("TexNoise"), product, "Fac", 0)
+    tree.link(tree.new("NewGeometry"), product, "Backfacing", 1)
+    tree.link(product, mix, 0, 0)
+    for k, colour in enumerate((WARM, COLD)):
+        tree.link(diffuse(colour)(tree), mix, 0, k + 1)
+    tree.show(mix)
+    add_cube(material=material)
+    found = read_scene(bpy.context.scene).materials[1]
+    assert found.reflectance == pytest.approx(WARM, abs=1e-3)
+    assert found.back.reflectance == pytest.approx((np.array(WARM) + COLD) / 2, abs=1e-3)  # mixed evenly, and said

@@ -240,7 +240,7 @@ def test_a_profile_and_a_power_of_the_distance_multiply_what_a_point_gives():
     share = by_direction(to / distance[:, None] @ turn.T)
     plain = share * position[2] / distance**3
     for power in (0.0, 1.0, 2.0):
-        for radius in (0.0, 1e-3):
+        for radius in (0.0, 1e-5):
             lamp = PointLight(
                 "lamp", tuple(position), (3.0, 2.0, 1.0), radius, distance_power=power,
                 profile=Environment("profile", pixels, tuple(map(tuple, turn))),

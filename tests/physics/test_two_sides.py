@@ -81,6 +81,8 @@ def test_a_panel_that_glows_in_front_lights_one_side_only():
     assert both.min() > 0.1
     assert light_of(radiance=bright, back=Back()) == pytest.approx(both, rel=1e-6)
     assert not light_of(radiance=dark, back=Back(radiance=bright)).any()
+    assert light_of(radiance=bright, open_side="back") == pytest.approx(both, rel=1e-6)
+    assert not light_of(radiance=bright, open_side="front").any()
     assert light_of(radiance=dim, back=Back(radiance=bright)) == pytest.approx(0.1 * both, rel=1e-6)
 
 
