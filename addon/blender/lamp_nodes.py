@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.emitters import LUMINANCE
+from ..core.environment import Environment
 from ..core.scene import BRIGHTEST
 from .colour_nodes import blackbody
 from .private_render import RenderError
@@ -74,13 +75,12 @@ def _constant(tree):
 
 def _as_shown(lamp, pixels, distance_power, warn):
     """The colour of what is shown, and its luminance as a profile."""
-    pixels = np.clip(np.nan_to_num(pixels, posinf=0.0), 0.0, BRIGHTEST)
+    pixels = np.clip(np.nan_to_num(pixels, posinf=0.0), 0.0, BRIGHTEST).astype(np.float32)
     luminance = pixels @ LUMINANCE.astype(np.float32)
     most = float(luminance.max())
     if not most > 0:
         return NodeFactor(np.zeros(3))
-    height = len(pixels)
-    solid_angles = np.cos((np.arange(height) + 0.5) / height * np.pi - np.pi / 2)[:, None, None]
+    solid_angles = Environment(lamp.name, pixels).solid_angles[:, None, None]
     mean = (pixels * solid_angles).sum(axis=(0, 1), dtype=np.float64)
     hue = mean / (mean @ LUMINANCE)
     if (np.abs(pixels - luminance[..., None] * hue) > COLOURED * most * hue.max()).any():

@@ -20,6 +20,7 @@ class MeshColours:
     """In place of UVs: the palette's texel of each triangle's mean colour, by an attribute ("" = the render one)."""
 
     attribute: str
+    extends: bool = False  # no place is beyond the palette's edges
 
     def uvs_of(self, mesh, chosen) -> np.ndarray:
         """UVs of chosen triangles (K,) of read_mesh.MeshArrays, float32 (K, 3, 2)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from contextlib import contextmanager
+from math import radians
 from pathlib import Path
 
 import bpy
@@ -11,6 +12,9 @@ import numpy as np
 
 RESULT = "Render Result"  # Blender's image of every scene's last render, which the first makes
 ON_DIFFUSE_SURFACES = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
+
+
+LOOKS_TO_X = (radians(90), 0, radians(-90))  # +X in the middle and +Z up
 
 
 class RenderError(RuntimeError):
@@ -48,6 +52,15 @@ def _set_up(scene):
     scene.render.use_compositing = scene.render.use_sequencer = False
     settings = scene.render.image_settings
     settings.file_format, settings.color_mode, settings.color_depth = "OPEN_EXR", "RGB", "32"
+
+
+def look_all_round(scene) -> None:
+    """Let the scene's camera see all directions from the origin, as the pixels of a core Environment are laid out."""
+    camera = scene.camera.data
+    camera.type = "PANO"
+    # the place that it has had since Blender 5.0, else Cycles' own
+    (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
+    scene.camera.rotation_euler = LOOKS_TO_X
 
 
 def rendered(scene, width, height) -> np.ndarray:

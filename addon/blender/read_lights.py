@@ -44,10 +44,11 @@ def read_lights(depsgraph, visibility, warn) -> tuple:
 
 
 def _shown(depsgraph, visibility):
-    """Entries of lamps that diffuse surfaces see in a render."""
+    """Entries of lamps that have power, whatever their nodes say, and that diffuse surfaces see in a render."""
     for instance in depsgraph.object_instances:
-        if instance.object.type == "LIGHT" and visibility.shows(instance):
-            if seen_by(instance)[1] and not _is_portal(instance.object.data):
+        if instance.object.type == "LIGHT" and visibility.shows(instance) and seen_by(instance)[1]:
+            lamp = instance.object.data
+            if not _is_portal(lamp) and max(_power(lamp)) > 0:
                 yield instance
 
 

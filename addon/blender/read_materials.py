@@ -128,7 +128,7 @@ class MaterialReading:
             transmittance.texture,
             tuple(float(x) for x in translucence.value),
             translucence.texture,
-            textures_extend=getattr(self.coordinates(), "extends", False),
+            textures_extend=self.coordinates().extends,
         )
 
     def coordinates(self) -> Coordinates | MeshColours:

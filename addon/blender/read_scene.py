@@ -96,7 +96,7 @@ class SceneReading:
         """Append every mesh entry of the depsgraph that a render shows."""
         self._require_known()
         shared = SharedMeshes(self.depsgraph, self.settings)
-        entries, unseen = Counter(), {}
+        entries, unseen, told = Counter(), {}, set()
         # The iterator's objects are temporary: nothing of them is kept past its turn of the loop. Curves and their
         # like come twice, as themselves and as meshes; only the meshes are taken.
         for instance in self.depsgraph.object_instances:
@@ -109,6 +109,9 @@ class SceneReading:
                 continue
             number, entries[name] = entries[name], entries[name] + 1
             if self.visibility.shows(instance):
+                if name not in told:  # instances may be many
+                    say_what_is_unseen(instance.object, self.warn)
+                    told.add(name)
                 self._read_instance(instance, f"{name}#{number}" if instance.is_instance else name, shared)
         for name in sorted(unseen.keys() - entries.keys()):  # nodes may make meshes of them
             self.warn(f"'{name}' is {unseen[name]}: the bake does not see it")
@@ -151,7 +154,6 @@ class SceneReading:
 
     def _read_instance(self, instance, name, shared):
         evaluated = instance.object
-        say_what_is_unseen(evaluated, self.warn)
         matrix = np.array(instance.matrix_world, np.float64)
         mesh = evaluated.to_mesh()
         try:

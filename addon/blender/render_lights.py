@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import pi
 from pathlib import Path
 
 import bmesh
 import bpy
 import numpy as np
 
-from .private_render import RenderError, adapted_copy, passing_blocks, private_scene, rendered, why_not_shown
+from .private_render import (
+    RenderError,
+    adapted_copy,
+    look_all_round,
+    passing_blocks,
+    private_scene,
+    rendered,
+    why_not_shown,
+)
 
 WIDTH, HEIGHT, SAMPLES = 256, 128, 4  # some 1.4 degrees a pixel: photometric files have 2.5 to 15
 COARSER = 8  # pixels along a side that are one where only the distance is asked about
 SEGMENTS = 128  # of the ball along its equator: its faces lie 3e-4 of its radius within it at the most
-LOOKS_TO_X = (radians(90), 0, radians(-90))  # +X in the middle and +Z up, as core Environment has it
 BY_DISTANCE = {"LIGHT_FALLOFF", "LIGHT_PATH"}  # nodes that may know how far the light goes
 OF_THE_WORLD = {"NEW_GEOMETRY", "OBJECT_INFO", "VECT_TRANSFORM"}  # and how a lamp stands there, which a ball does not
 OF_THE_LAMP = {"Normal", "Generated", "UV"}  # outputs of Texture Coordinate
@@ -37,7 +44,8 @@ def rendered_lamp(lamp, frame: int) -> tuple[np.ndarray, float]:
         point = _bare_point(copy)
         ball = _placed(scene, _white_ball(blocks), blocks)
         _placed(scene, point, blocks)
-        _look_all_round(scene)
+        look_all_round(scene)
+        scene.cycles.samples, scene.cycles.use_adaptive_sampling, scene.cycles.max_bounces = SAMPLES, False, 0
         shown = pi * rendered(scene, WIDTH, HEIGHT)  # E / pi at 1 m
         if not any(node.type in BY_DISTANCE for node in nodes):
             return shown, 0.0
@@ -111,12 +119,3 @@ def _white_ball(io_blocks):
     mesh.materials.append(white)
     io_blocks += [mesh, white]
     return mesh
-
-
-def _look_all_round(scene):
-    camera, cycles = scene.camera.data, scene.cycles
-    camera.type = "PANO"
-    # the place that it has had since Blender 5.0, else Cycles' own
-    (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
-    scene.camera.rotation_euler = LOOKS_TO_X
-    cycles.samples, cycles.use_adaptive_sampling, cycles.max_bounces = SAMPLES, False, 0

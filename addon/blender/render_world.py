@@ -6,13 +6,20 @@ from math import radians
 
 import numpy as np
 
-from .private_render import RenderError, adapted_copy, passing_blocks, private_scene, rendered, why_not_shown
+from .private_render import (
+    RenderError,
+    adapted_copy,
+    look_all_round,
+    passing_blocks,
+    private_scene,
+    rendered,
+    why_not_shown,
+)
 
 WIDTH, HEIGHT = 1024, 512
 LEAST_SAMPLES, SAMPLES, NOISE = 8, 256, 0.02  # of a pixel: all where the sun's edge crosses it, which is .3 % of its
 # light; others stop where they are as sure as this,
 LEAST_SUN = radians(0.5)  # and would miss a smaller one
-LOOKS_TO_X = (radians(90), 0, radians(-90))  # +X in the middle and +Z up, as core Environment has it
 
 
 def rendered_world(world, frame: int) -> np.ndarray:
@@ -22,7 +29,8 @@ def rendered_world(world, frame: int) -> np.ndarray:
     with passing_blocks() as blocks, private_scene(frame) as scene:
         copy, trees = adapted_copy(world, blocks)
         _adapt(copy, trees)
-        _look_all_round(scene)
+        look_all_round(scene)
+        _sample_as_needed(scene.cycles)
         scene.world = copy
         return rendered(scene, WIDTH, HEIGHT)
 
@@ -41,11 +49,6 @@ def _adapt(world, trees):
                 node.id_data.links.remove(link)
 
 
-def _look_all_round(scene):
-    camera, cycles = scene.camera.data, scene.cycles
-    camera.type = "PANO"
-    # the place that it has had since Blender 5.0, else Cycles' own
-    (camera if hasattr(camera, "panorama_type") else camera.cycles).panorama_type = "EQUIRECTANGULAR"
-    scene.camera.rotation_euler = LOOKS_TO_X
+def _sample_as_needed(cycles):
     cycles.samples = SAMPLES
     cycles.use_adaptive_sampling, cycles.adaptive_threshold, cycles.adaptive_min_samples = True, NOISE, LEAST_SAMPLES

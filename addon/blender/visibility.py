@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bpy
+
 RENDERED_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "VOLUME", "CURVES", "LIGHT"}
 
 
@@ -12,6 +14,7 @@ class Visibility:
         self._view_layer = view_layer
         self._rendered = set()
         self._collect(view_layer.layer_collection)
+        self._left_out = _names_in_hidden_collections()
 
     def shows(self, instance) -> bool:
         """Whether a render shows this entry of ``depsgraph.object_instances``."""
@@ -19,9 +22,9 @@ class Visibility:
         if blender_object.hide_render:
             return False
         if instance.is_instance:
-            parent, of = instance.parent.original, blender_object.users_collection
-            is_left_out = of and all(collection.hide_render for collection in of)
-            return not parent.hide_render and parent.name in self._rendered and not is_left_out
+            parent = instance.parent.original
+            is_made = not parent.hide_render and parent.name in self._rendered
+            return is_made and blender_object.name not in self._left_out
         if blender_object.is_instancer and not blender_object.show_instancer_for_render:
             return False
         return blender_object.name in self._rendered
@@ -47,6 +50,16 @@ class Visibility:
         self._rendered.update(o.name for o in layer_collection.collection.objects)
         for child in layer_collection.children:
             self._collect(child)
+
+
+def _names_in_hidden_collections():
+    """Objects all of whose collections no render shows; asked of each instance that would take as long as a file has
+    objects."""
+    shown = {o.name for scene in bpy.data.scenes for o in scene.collection.objects}
+    hidden = set()
+    for collection in bpy.data.collections:
+        (hidden if collection.hide_render else shown).update(o.name for o in collection.objects)
+    return hidden - shown
 
 
 def seen_by(instance) -> tuple[bool, bool]:

@@ -116,8 +116,7 @@ def _light_row(light, centre):
 def _glowing_triangles(scene):
     """World corners float64 (N, 3, 3) and radiance of front and back (N, 6) of all triangles that emit."""
     emits = np.array([m.emits for m in scene.materials], bool)
-    images = [[side.radiance_texture for side in (m, m.of_back)] for m in scene.materials]
-    is_image = np.array([any(image is not None for image in both) for both in images], bool)
+    is_image = np.array([any((m.radiance_texture, m.of_back.radiance_texture)) for m in scene.materials], bool)
     cut = np.flatnonzero((emits & is_image)[scene.triangle_materials])
     # at one place of its image a triangle has one colour
     cut = cut[(scene.uvs[cut] != scene.uvs[cut, :1]).any(axis=(1, 2))]

@@ -12,6 +12,8 @@ if find_spec("bpy") is None:
 else:
     import bpy
 
+    from addon.blender.read_scene import read_scene
+
 
 @pytest.fixture
 def empty_file():
@@ -116,3 +118,18 @@ def add_image():
         return image
 
     return add
+
+
+@pytest.fixture
+def read_material(add_cube):
+    """Read a material on a cube: (core material, warnings)."""
+
+    def read(material):
+        if not bpy.data.objects:
+            add_cube().data.uv_layers.new(name="UVMap")
+        bpy.data.objects[0].data.materials.clear()
+        bpy.data.objects[0].data.materials.append(material)
+        scene = read_scene(bpy.context.scene)
+        return scene.materials[scene.triangle_materials[0]], scene.warnings
+
+    return read

@@ -142,22 +142,3 @@ def test_what_was_selected_still_is(add_cube, collection):
     with as_rendered(bpy.context.scene, bpy.context.view_layer):
         pass
     assert cube.select_get()
-
-
-def test_what_stays_hidden_or_asks_for_the_viewport_is_told(add_cube):
-    add_cube("Room")
-    driven = add_cube("Driven")
-    driven.driver_add("hide_viewport").driver.expression = "1"
-    asking = add_cube("Asking")
-    tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
-    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    asks, switch, out = (
-        tree.nodes.new(kind) for kind in ("GeometryNodeIsViewport", "GeometryNodeSwitch", "NodeGroupOutput")
-    )
-    tree.links.new(asks.outputs[0], switch.inputs[0])
-    tree.links.new(switch.outputs[0], out.inputs[0])
-    asking.modifiers.new("Nodes", "NODES").node_group = tree
-    bpy.context.view_layer.update()
-    warnings = read_scene(bpy.context.scene, BakeSettings()).warnings
-    assert "'Driven' stays hidden in the viewport, by what drives it: the bake does not see it" in warnings
-    assert "'Asking': Nodes asks whether it is for the viewport, and is read as if it were" in warnings

@@ -8,27 +8,11 @@ import pytest
 
 from addon.blender.read_scene import read_scene
 from addon.core.scene import SceneError
-from addon.core.textures import lookup
 
 pytestmark = pytest.mark.usefixtures("empty_file")
 
 RED = (0.5, 0.25, 0.125, 1.0)  # exact in float32
 GREY = (0.75, 0.75, 0.75, 1.0)
-
-
-@pytest.fixture
-def read(add_cube):
-    """Read a material on a cube: (core material, warnings)."""
-
-    def read_material(material):
-        if not bpy.data.objects:
-            add_cube().data.uv_layers.new(name="UVMap")
-        bpy.data.objects[0].data.materials.clear()
-        bpy.data.objects[0].data.materials.append(material)
-        scene = read_scene(bpy.context.scene)
-        return scene.materials[scene.triangle_materials[0]], scene.warnings
-
-    return read_material
 
 
 def image_node(tree, image):
@@ -64,10 +48,10 @@ def checker():
         ("BsdfRefraction", {"Color": RED}, 0, 0, RED),
     ],
 )
-def test_the_table(nodes, read, kind, inputs, reflectance, radiance, transmittance):
+def test_the_table(nodes, read_material, kind, inputs, reflectance, radiance, transmittance):
     material, tree = nodes()
     tree.show(tree.new(kind, **inputs))
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     for value, expected in (
         (found.reflectance, reflectance),
         (found.radiance, radiance),
@@ -79,7 +63,7 @@ def test_the_table(nodes, read, kind, inputs, reflectance, radiance, transmittan
 
 
 @pytest.mark.parametrize(("output", "radiance"), [("Is Camera Ray", 0.0), ("Is Diffuse Ray", 6.0), ("Ray Depth", 6.0)])
-def test_light_is_what_rays_from_diffuse_surfaces_see(nodes, read, output, radiance):
+def test_light_is_what_rays_from_diffuse_surfaces_see(nodes, read_material, output, radiance):
     """A strength that hangs on the kind of ray, by way of a product."""
     material, tree = nodes()
     product = tree.new("Math")
@@ -87,32 +71,32 @@ def test_light_is_what_rays_from_diffuse_surfaces_see(nodes, read, output, radia
     product.inputs[1].default_value = 6.0
     tree.link(tree.new("LightPath"), product, output, 0)
     tree.show(tree.link(product, tree.new("Emission", Color=(1, 1, 1, 1)), 0, "Strength"))
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     np.testing.assert_allclose(found.radiance, radiance, rtol=1e-6)
     assert warnings == ()
 
 
 @pytest.mark.parametrize(("kind", "meets"), [("Is Shadow Ray", (False, True)), ("Is Diffuse Ray", (True, False))])
-def test_nodes_that_let_one_kind_of_rays_pass(nodes, read, kind, meets):
+def test_nodes_that_let_one_kind_of_rays_pass(nodes, read_material, kind, meets):
     material, tree = nodes("Fake")
     mix = tree.link(tree.new("LightPath"), tree.new("MixShader"), kind, 0)
     tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
     tree.link(tree.new("BsdfTransparent"), mix, 0, 2)
     tree.show(mix)
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     assert (found.meets_shadow_rays, found.meets_light) == meets
     assert found.reflectance == (GREY[:3] if found.meets_light else (0, 0, 0))
     assert found.transmittance == (0, 0, 0)
     assert warnings == ()
 
 
-def test_a_tint_of_shadow_rays_alone_is_told(nodes, read):
+def test_a_tint_of_shadow_rays_alone_is_told(nodes, read_material):
     material, tree = nodes("Fake")
     mix = tree.link(tree.new("LightPath"), tree.new("MixShader"), "Is Shadow Ray", 0)
     tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
     tree.link(tree.new("BsdfTransparent", Color=GREY), mix, 0, 2)
     tree.show(mix)
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     assert found.is_opaque
     assert warnings == ("material 'Fake': shadow rays pass it as light that bounces does",)
 
@@ -128,11 +112,11 @@ def test_what_an_object_hides_of_a_material_adds_to_what_its_nodes_do(nodes, add
     assert (found.meets_shadow_rays, found.meets_light) == (False, False)
 
 
-def test_a_strength_may_be_an_image(nodes, read, add_image):
+def test_a_strength_may_be_an_image(nodes, read_material, add_image):
     material, tree = nodes()
     image = image_node(tree, add_image(checker(), is_float=True, space="Non-Color"))
     tree.show(tree.link(image, tree.new("Emission", Color=RED), "Color", "Strength"))
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     luminance = checker() @ (0.2126, 0.7152, 0.0722)
     np.testing.assert_allclose(
         found.radiance_texture.pixels * found.radiance, luminance[..., None] * RED[:3], rtol=1e-4
@@ -140,20 +124,20 @@ def test_a_strength_may_be_an_image(nodes, read, add_image):
     assert warnings == ()
 
 
-def test_a_translucent_shader_scatters_to_the_other_side(nodes, read):
+def test_a_translucent_shader_scatters_to_the_other_side(nodes, read_material):
     material, tree = nodes()
     mix = tree.new("MixShader", Fac=0.25)
     tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
     tree.link(tree.new("BsdfTranslucent", Color=RED), mix, 0, 2)
     tree.show(mix)
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     np.testing.assert_allclose(found.translucence, np.array(RED[:3]) * 0.25)
     np.testing.assert_allclose(found.reflectance, np.array(GREY[:3]) * 0.75)
     assert not found.transmits
     assert warnings == ()
 
 
-def test_a_mix_is_the_weighted_sum_and_an_add_the_sum(nodes, read):
+def test_a_mix_is_the_weighted_sum_and_an_add_the_sum(nodes, read_material):
     material, tree = nodes()
     mix, add = tree.new("MixShader", Fac=0.25), tree.new("AddShader")
     tree.link(tree.new("BsdfDiffuse", Color=GREY), mix, 0, 1)
@@ -161,28 +145,28 @@ def test_a_mix_is_the_weighted_sum_and_an_add_the_sum(nodes, read):
     tree.link(mix, add, 0, 0)
     tree.link(tree.new("Emission", Color=RED, Strength=2.0), add, 0, 1)
     tree.show(add)
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     np.testing.assert_allclose(found.reflectance, GREY[:3])
     np.testing.assert_allclose(found.transmittance, [0.25] * 3)
     np.testing.assert_allclose(found.radiance, np.array(RED[:3]) * 2)
     assert warnings == ()
 
 
-def test_a_sum_that_gives_more_than_it_gets_is_dimmed_and_said(nodes, read):
+def test_a_sum_that_gives_more_than_it_gets_is_dimmed_and_said(nodes, read_material):
     """Eight tenths of red are reflected, and as many pass: of a light of 1 there are 1, a half each."""
     material, tree = nodes("Sum")
     add = tree.new("AddShader")
     tree.link(tree.new("BsdfDiffuse", Color=(0.8, 0, 0, 1)), add, 0, 0)
     tree.link(tree.new("BsdfTransparent", Color=(0.8, 0, 0, 1)), add, 0, 1)
     tree.show(add)
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     np.testing.assert_allclose(found.transmittance, (0.5, 0, 0), rtol=1e-6)
     met = 1 - np.mean(found.transmittance)
     np.testing.assert_allclose(met * np.array(found.reflectance), (0.5, 0, 0), rtol=1e-6)
     assert any("'Sum'" in warning and "dimmed" in warning for warning in warnings)
 
 
-def test_a_mix_of_image_and_colour_is_one_texture(nodes, read, add_image):
+def test_a_mix_of_image_and_colour_is_one_texture(nodes, read_material, add_image):
     material, tree = nodes()
     pixels = checker()
     mix, diffuse = tree.new("MixShader", Fac=0.5), tree.new("BsdfDiffuse")
@@ -190,12 +174,12 @@ def test_a_mix_of_image_and_colour_is_one_texture(nodes, read, add_image):
     tree.link(diffuse, mix, 0, 1)
     tree.link(tree.new("BsdfDiffuse", Color=RED), mix, 0, 2)
     tree.show(mix)
-    found, _ = read(material)
+    found, _ = read_material(material)
     shown = found.reflectance_texture.pixels * found.reflectance
     np.testing.assert_allclose(shown, pixels / 2 + np.array(RED[:3]) / 2, atol=1e-6)  # float32 sums
 
 
-def test_links_go_through_reroutes_groups_and_muted_nodes(nodes, read):
+def test_links_go_through_reroutes_groups_and_muted_nodes(nodes, read_material):
     group = bpy.data.node_groups.new("Paint", "ShaderNodeTree")
     group.interface.new_socket("Paint", in_out="INPUT", socket_type="NodeSocketColor")
     group.interface.new_socket("Shader", in_out="OUTPUT", socket_type="NodeSocketShader")
@@ -212,57 +196,30 @@ def test_links_go_through_reroutes_groups_and_muted_nodes(nodes, read):
     tree.link(gamma, reroute)
     tree.link(reroute, use, 0, "Paint")
     tree.show(use)
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     assert found.reflectance == RED[:3]
     assert warnings == ()
 
 
-def test_srgb_bytes_become_linear_and_data_and_floats_stay(nodes, read, add_image):
-    pixels = checker()
-    linear = np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
-    for is_float, space, expected in (
-        (False, "sRGB", linear),
-        (False, "Non-Color", pixels),
-        (True, "Non-Color", pixels),
-    ):
-        material, tree = nodes(f"{space} {is_float}")
-        diffuse = tree.new("BsdfDiffuse")
-        tree.link(image_node(tree, add_image(pixels, is_float=is_float, space=space)), diffuse, 0, "Color")
-        tree.show(diffuse)
-        found, warnings = read(material)
-        np.testing.assert_allclose(found.reflectance_texture.pixels, expected, atol=1e-6)  # float32
-        assert warnings == ()
-
-
-def test_an_image_that_two_materials_use_is_one_texture(nodes, add_cube, add_image):
-    image = add_image(checker())
-    for name in "AB":
-        material, tree = nodes(name)
-        tree.show(tree.link(image_node(tree, image), tree.new("BsdfDiffuse"), 0, "Color"))
-        add_cube(name, material).data.uv_layers.new(name="UVMap")
-    first, second = read_scene(bpy.context.scene).materials[1:]
-    assert first.reflectance_texture is second.reflectance_texture is not None
-
-
-def test_an_emission_texture_is_scaled_by_the_strength(nodes, read, add_image):
+def test_an_emission_texture_is_scaled_by_the_strength(nodes, read_material, add_image):
     material, tree = nodes()
     tree.show(
         tree.link(
             image_node(tree, add_image(checker(), space="Non-Color")), tree.new("Emission", Strength=4.0), 0, "Color"
         )
     )
-    found, _ = read(material)
+    found, _ = read_material(material)
     np.testing.assert_allclose(found.radiance_texture.pixels * found.radiance, checker() * 4, atol=1e-6)  # float32
 
 
-def test_reflectance_above_one_is_clipped(nodes, read, add_image):
+def test_reflectance_above_one_is_clipped(nodes, read_material, add_image):
     material, tree = nodes("Value")
     tree.show(tree.new("BsdfDiffuse", Color=(2.0, 0.5, -1.0, 1.0)))
-    assert read(material)[0].reflectance == (1.0, 0.5, 0.0)
+    assert read_material(material)[0].reflectance == (1.0, 0.5, 0.0)
     material, tree = nodes("Texture")
     pixels = checker() * 3
     tree.show(tree.link(image_node(tree, add_image(pixels, is_float=True, space="Non-Color")), tree.new("BsdfDiffuse")))
-    found, _ = read(material)
+    found, _ = read_material(material)
     shown = found.reflectance_texture.pixels * found.reflectance
     np.testing.assert_allclose(shown, np.clip(pixels, 0, 1), atol=1e-6)  # float32
 
@@ -300,82 +257,56 @@ def test_a_uv_map_node_chooses_its_layer(nodes, add_mesh, add_image):
     assert (read_scene(bpy.context.scene).uvs == 1.5).all()
 
 
-def test_unreadable_colours_take_the_viewport_colour_and_are_named(nodes, read):
+def test_unreadable_colours_take_the_viewport_colour_and_are_named(nodes, read_material):
     material, tree = nodes("Marble")
     material.diffuse_color = RED
     # each object has a colour of its own: a tile has another
     node = tree.new("Attribute")
     node.attribute_type, node.attribute_name = "OBJECT", "color"
     tree.show(tree.link(node, tree.new("BsdfDiffuse"), "Color", "Color"))
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     assert found.reflectance == RED[:3]
     assert len(warnings) == 1
     assert "'Marble'" in warnings[0]
     assert "Attribute node" in warnings[0]
 
 
-def test_an_unreadable_shader_takes_the_viewport_colour_and_is_named(nodes, read):
+def test_an_unreadable_shader_takes_the_viewport_colour_and_is_named(nodes, read_material):
     material, tree = nodes("Fur")
     material.diffuse_color = RED
     tree.show(tree.new("BsdfHair"))
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     assert found.reflectance == RED[:3]
     assert "'Fur'" in warnings[0]
 
 
-def test_an_image_that_cannot_be_loaded_is_named(nodes, read):
-    material, tree = nodes("Poster")
-    material.diffuse_color = RED
-    image = bpy.data.images.new("Lost", 1, 1)
-    image.source, image.filepath = "FILE", "//no such picture.png"
-    tree.show(tree.link(image_node(tree, image), tree.new("BsdfDiffuse"), 0, "Color"))
-    found, warnings = read(material)
-    assert found.reflectance == RED[:3]
-    assert "'Poster'" in warnings[0]
-    assert "'Lost'" in warnings[0]
-
-
-def test_generated_coordinates_use_the_mean_colour(nodes, read, add_image):
+def test_generated_coordinates_use_the_mean_colour(nodes, read_material, add_image):
     material, tree = nodes("Box")
     node = image_node(tree, add_image(checker(), space="Non-Color"))
     tree.link(tree.new("TexCoord"), node, "Generated", "Vector")
     tree.show(tree.link(node, tree.new("BsdfDiffuse"), 0, "Color"))
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     assert found.reflectance_texture is None
     np.testing.assert_allclose(found.reflectance, checker().mean(axis=(0, 1)), atol=1e-6)  # float32
     assert "'Box'" in warnings[0]
 
 
-def test_nothing_linked_is_black_and_no_nodes_is_the_viewport_colour(nodes, read):
+def test_nothing_linked_is_black_and_no_nodes_is_the_viewport_colour(nodes, read_material):
     material, tree = nodes()
     tree.new("OutputMaterial")
-    assert read(material)[0].reflectance == (0, 0, 0)
+    assert read_material(material)[0].reflectance == (0, 0, 0)
     plain = bpy.data.materials.new("Plain")
     plain.use_nodes = False
     plain.diffuse_color = RED
-    assert read(plain)[0].reflectance == RED[:3]
+    assert read_material(plain)[0].reflectance == RED[:3]
 
 
-def test_a_glossy_shader_is_baked_as_diffuse_and_said_so(nodes, read):
+def test_a_glossy_shader_is_baked_as_diffuse_and_said_so(nodes, read_material):
     material, tree = nodes("Chrome")
     tree.show(tree.new("BsdfAnisotropic", Color=RED))
-    found, warnings = read(material)
+    found, warnings = read_material(material)
     assert found.reflectance == RED[:3]
     assert "'Chrome'" in warnings[0]
-
-
-def test_a_large_image_is_shrunk_without_changing_its_mean(nodes, read, add_image):
-    material, tree = nodes()
-    pixels = np.random.default_rng(1).random((4, 4100, 3), dtype=np.float32)
-    tree.show(
-        tree.link(
-            image_node(tree, add_image(pixels, is_float=True, space="Non-Color")), tree.new("BsdfDiffuse"), 0, "Color"
-        )
-    )
-    texture = read(material)[0].reflectance_texture.pixels
-    assert texture.shape == (4, 1366, 3)
-    # 4100 = 3 x 1366 + 2 columns: the last two are left out
-    np.testing.assert_allclose(texture.mean(axis=(0, 1)), pixels[:, :4098].mean(axis=(0, 1)), rtol=1e-5)
 
 
 def test_a_volume_alone_lets_all_light_pass_and_is_not_baked(nodes, add_cube):
@@ -390,16 +321,16 @@ def test_a_volume_alone_lets_all_light_pass_and_is_not_baked(nodes, add_cube):
         read_scene(bpy.context.scene, object_names=["Fog"])
 
 
-def test_a_volume_and_displacement_of_a_surface_are_told(nodes, read):
+def test_a_volume_and_displacement_of_a_surface_are_told(nodes, read_material):
     material, tree = nodes("stuff")
     output = tree.link(tree.new("BsdfDiffuse"), tree.new("OutputMaterial"), 0, "Surface")
     for kind, name in (("VolumeScatter", "Volume"), ("Displacement", "Displacement")):
         tree.tree.links.new(tree.new(kind).outputs[0], output.inputs[name])
     material.displacement_method = "BUMP"
-    _, warnings = read(material)
+    _, warnings = read_material(material)
     assert warnings == ("material 'stuff': its volume is not baked: light passes as if there were none",)
     material.displacement_method = "DISPLACEMENT"
-    _, warnings = read(material)
+    _, warnings = read_material(material)
     assert "material 'stuff': its displacement is not baked" in warnings
 
 
@@ -411,37 +342,3 @@ def test_a_material_override_takes_the_place_of_all(nodes, add_cube):
     scene = read_scene(bpy.context.scene)
     (used,) = np.unique(scene.triangle_materials)
     assert scene.materials[used].name == "clay"
-
-
-@pytest.mark.parametrize("size", [(4, 2048), (8, 100), (300, 300), (1, 1)])
-def test_a_clipped_image_is_all_there_however_thin(nodes, read, add_image, size):
-    """White within, through a node that shrinks it; black from a texel beyond its edges on."""
-    material, tree = nodes()
-    image = image_node(tree, add_image(np.ones((*size, 3), np.float32), is_float=True, space="Non-Color"))
-    image.extension = "CLIP"
-    gamma = tree.link(image, tree.new("Gamma", Gamma=1.0), "Color", "Color")
-    tree.show(tree.link(gamma, tree.new("BsdfDiffuse"), 0, "Color"))
-    found, _ = read(material)
-    assert found.textures_extend
-    texel = 1 / np.minimum(np.maximum(size[::-1], 16), 256)  # which nodes leave
-    within = np.array([(0.5, 0.5), 1.5 * texel, 1 - 1.5 * texel])
-    beyond = np.array([(0.5, -1.5 * texel[1]), (1 + 1.5 * texel[0], 0.5), (5.0, 0.5)])
-    for places, value in ((within, 1.0), (beyond, 0.0)):
-        places = (1 / 18 + places * 16 / 18) * found.reflectance[0]
-        np.testing.assert_allclose(lookup(found.reflectance_texture, places, True), value, atol=1e-6)
-
-
-def test_images_that_end_in_several_ways_share_their_coordinates(nodes, read, add_image):
-    material, tree = nodes("decal")
-    colour = image_node(tree, add_image(checker(), "a", is_float=True, space="Non-Color"))
-    share = image_node(tree, add_image(checker(), "b", is_float=True, space="Non-Color"))
-    share.extension = "CLIP"
-    mix = tree.link(share, tree.new("MixShader"), "Color", 0)
-    tree.link(tree.new("BsdfTransparent"), mix, 0, 1)
-    tree.show(tree.link(tree.link(colour, tree.new("BsdfDiffuse"), "Color", "Color"), mix, 0, 2))
-    found, warnings = read(material)
-    assert not found.textures_extend
-    assert found.transmittance_texture.pixels.shape == checker().shape
-    assert warnings == (
-        "material 'decal': its images go on in several ways beyond their edges: all are repeated there",
-    )
