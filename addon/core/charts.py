@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -30,7 +31,7 @@ class Charts:
     rects: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class FlatCharts:
     """Charts before they are packed.
 
@@ -54,7 +55,7 @@ class FlatCharts:
         """Which chart each row is part of, int32 (N,)."""
         return np.repeat(np.arange(self.chart_count, dtype=np.int32), np.diff(self.first_triangles))
 
-    @property
+    @cached_property
     def sizes(self) -> np.ndarray:
         """Extents of the charts along u and v, float64 (C, 2) [m]."""
         if not self.chart_count:

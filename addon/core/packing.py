@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from .blocks import CHART_MARGIN, CHART_START, MOST_STEPS, Block, pack_block, pa
 from .charts import Charts, FlatCharts
 from .copies import Layout
 from .settings import BakeSettings, SettingsError
+from .workers import Workers
 
 MOST_TEXELS = 1 << 28
 FULL_ENOUGH = 0.985  # of the texels asked for
@@ -24,23 +26,24 @@ WIDTHS = (0.71, 0.84, 1.19, 1.41)  # other widths than the square's, where large
 FINE_WIDTHS = tuple(0.6 + 0.05 * step for step in range(21))
 FEW_CHARTS = 300  # in an atlas of single texels: so quickly packed that all of these are tried
 LARGE_CHART = 0.2  # of the width
+MUCH_SMALLER = 0.99  # is what another width takes where it is worth several tries more
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Surface:
     """What is to be packed: charts of objects with a mesh of their own, and layouts that objects share."""
 
     flat: FlatCharts
     layouts: tuple[Layout, ...]
 
-    @property
+    @cached_property
     def area(self) -> float:
         """[m^2]"""
         return self.flat.areas.sum() + sum(
             (layout.flat.areas.sum() * layout.factors.prod(axis=1)).sum() for layout in self.layouts
         )
 
-    @property
+    @cached_property
     def longest(self) -> float:
         """Side of a chart [m]."""
         sides = [layout.flat.sizes.max() * layout.factors.max() for layout in self.layouts]
@@ -77,7 +80,8 @@ def pack(surface: Surface, triangle_count: int, settings: BakeSettings) -> Chart
     if settings.density is not None:
         packing = _pack_at_density(surface, settings.density)
     else:
-        packing = _pack_into(surface, settings.texels)
+        with Workers(settings.thread_count) as workers:
+            packing = _pack_into(surface, settings.texels, workers)
     return _charts(surface, triangle_count, packing)
 
 
@@ -95,18 +99,20 @@ def _pack_at_density(surface, density):
     return packing
 
 
-def _pack_into(surface, texels):
+def _pack_into(surface, texels, workers):
     """As dense as it fits; the width of the square first, others where large charts make it matter."""
     width = math.isqrt(texels)
     best = _densest(surface, texels, width, math.sqrt(0.7 * texels / surface.area))
     if best.longest < LARGE_CHART * width:
         return best
     if surface.chart_count <= FEW_CHARTS and width <= MOST_STEPS:
-        others = [_densest(surface, texels, round(width * factor), best.density) for factor in FINE_WIDTHS]
+        widths = [round(width * factor) for factor in FINE_WIDTHS]
+        others = workers.each(widths, lambda other: _densest(surface, texels, other, best.density))
         return max([best, *others], key=lambda packing: packing.density)
-    others = [_pack_once(surface, best.density, round(width * factor)) for factor in WIDTHS]
+    widths = [round(width * factor) for factor in WIDTHS]
+    others = workers.each(widths, lambda other: _pack_once(surface, best.density, other))
     smallest = min(others, key=lambda packing: packing.texels)
-    if smallest.texels >= best.texels:
+    if smallest.texels > MUCH_SMALLER * best.texels:
         return best
     density = best.density * math.sqrt(texels / smallest.texels)
     return max(best, _densest(surface, texels, smallest.width, density), key=lambda packing: packing.density)

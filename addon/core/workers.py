@@ -7,7 +7,7 @@ between ranges the caller is told how far it is and may stop the bake.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from .settings import BakeCancelled
@@ -76,6 +76,10 @@ class Workers:
 
     def __exit__(self, *_) -> None:
         self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def each(self, items: Sequence, call: Callable) -> list:
+        """Run ``call(item)`` on each; their results in order."""
+        return self.each_range(len(items), 1, lambda start, _: call(items[start]))
 
     def each_range(self, count: int, size: int, call: Callable, on_step: Callable[[float], None] | None = None) -> list:
         """Run ``call(start, stop)`` on ranges of ``size`` up to ``count``; their results in order.
