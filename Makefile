@@ -2,7 +2,7 @@
 # make test   set everything up, run the tests
 # make fuzz   ten thousand random scenes baked whole (a quarter of an hour), and random calls of the kernel
 # make sanitize  the core's and the physics' tests over a kernel with address and undefined-behaviour checks
-# make test-window BLENDER=blender  the extension's zip in a real window of Blender: Bake pressed, watched, undone, cancelled
+# make test-window BLENDER=blender  the extension's zip in a real window of Blender: Bake pressed, watched, shown, undone, cancelled
 # make bench  speed against error on exact scenes, quick settings: a table, and JSON and plots in out/bench
 # make bench-cycles SCENE=S.blend REFERENCE=S.npz  seconds and error beside Cycles' own bake of the same texels
 # make bench-rays SCENE=S.blend  our kernels' rays per second against a bare loop over the same rays

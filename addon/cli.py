@@ -26,7 +26,6 @@ NO_BLENDER = (
 )
 EXIT_ERROR, EXIT_CANCELLED = 1, 130
 DEFAULTS = BakeSettings()
-PICTURE_PIXELS = 960  # on the longer side
 
 
 class CommandError(Exception):
@@ -79,6 +78,13 @@ def parser() -> argparse.ArgumentParser:
     picture.add_argument("input", type=Path, metavar="BAKED.blend")
     picture.add_argument("output", type=Path, metavar="OUT.png")
     picture.add_argument("--lightmap", type=Path, metavar="OUT.png", help="the lightmap itself, too, to look at")
+    picture.add_argument(
+        "--bounces",
+        type=int,
+        default=0,
+        metavar="N",
+        help="trace so many bounces of sharp rays from mirrors and through glass; 0 = the bake alone (default)",
+    )
     picture.set_defaults(run=run_picture)
     _add_verify(commands)
     add_bench(commands)
@@ -211,9 +217,7 @@ def run_picture(args: argparse.Namespace) -> None:
             if path:
                 files.require_writable(path)
         files.open_blend(args.input)
-        render = bpy.context.scene.render
-        scale = PICTURE_PIXELS / max(render.resolution_x, render.resolution_y)
-        picture.render(args.output, round(scale * render.resolution_x), round(scale * render.resolution_y))
+        picture.render(args.output, *picture.size_of(bpy.context.scene), bounces=args.bounces)
         if args.lightmap:
             image = _lightmap(bpy.context.scene.objects)
             if image is None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from .ui import operators, panels, properties
+from .ui import operators, panels, preview, properties
 
-CLASSES = (*properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+CLASSES = (*properties.CLASSES, *operators.CLASSES, *preview.CLASSES, *panels.CLASSES)
 
 # Handles of commands, to give back at unregister: Blender identifies a command by the handle alone.
 _commands = []

@@ -252,12 +252,25 @@ def test_a_picture_has_the_shape_of_the_scene(room_blend, capfd):
     scene.collection.objects.link(scene.camera)
     scene.render.resolution_x, scene.render.resolution_y = 50, 100
     bpy.ops.wm.save_mainfile()
-    words = ["picture", folder / "room_baked.blend", folder / "p.png", "--lightmap", folder / "l.png"]
+    words = ["picture", folder / "room_baked.blend", folder / "p.png", "--lightmap", folder / "l.png", "--bounces", "2"]
     assert cli.main([str(word) for word in words]) == 0
     picture = bpy.data.images.load(str(folder / "p.png"))
     assert tuple(picture.size) == (480, 960)
     assert max(list(picture.pixels)[::4]) > 0, "the room is lit"
     assert (folder / "l.png").exists()
+
+
+def test_a_picture_of_what_is_not_baked_is_refused(room_blend, capsys):
+    import bpy
+
+    bpy.ops.wm.open_mainfile(filepath=str(room_blend))
+    scene = bpy.context.scene
+    scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(scene.camera)
+    bpy.ops.wm.save_mainfile()
+    png = room_blend.parent / "p.png"
+    fails_with_one_line(capsys, ["picture", room_blend, png], "no object that is rendered has a bake")
+    fails_with_one_line(capsys, ["picture", room_blend, png, "--bounces", "-1"], "bounces is -1")
 
 
 # ---- progress ----

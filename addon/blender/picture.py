@@ -2,7 +2,8 @@
 
 Everything happens in a scene of its own, made of copies: the scene that is shown, its materials, lights and world are
 not touched, and the copies are gone afterwards. No light is copied; every surface only emits what the bake and its own
-material say; no ray bounces. So whatever is bright in the picture is bright in the bake.
+material say. So whatever is bright in the picture is bright in the bake, or a mirror of it: rays bounce from what is
+smooth only, and only where that is asked for.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from .rects import in_lightmap, rect_of
 from .visibility import Visibility
 from .write_lightmap import IMAGE_PROPERTY, set_lightmap_uvs
 
+SEEN_BY = ("visible_camera", "visible_glossy", "visible_transmission")
+LONGER_SIDE = 960  # pixels
+MOST_BOUNCES = 1024
 MIDDLE_GREY = 0.20  # radiance that the median of the picture is exposed to: dark corners open, sun patches keep shape
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -28,22 +32,37 @@ class PictureError(ValueError):
     """A scene that cannot be shown; the message says what is missing."""
 
 
-def render(path_png, width=960, height=540, samples=16, view_transform="AgX", exposure=None):
+def size_of(scene) -> tuple[int, int]:
+    """Width and height of a picture that has the shape of the scene's renders."""
+    sides = scene.render.resolution_x, scene.render.resolution_y
+    width, height = (max(round(LONGER_SIDE * side / max(sides)), 1) for side in sides)
+    return width, height
+
+
+def render(path_png, width=960, height=540, samples=16, view_transform="AgX", exposure=None, bounces=0):
     """Render the current scene's bake through its camera into an 8-bit PNG.
 
     Parameters
     ----------
-    samples : rays per pixel; they only smooth edges, as nothing here is random but the place within the pixel
+    samples : rays per pixel; they only smooth edges, as nothing here is random but the place within the pixel, and
+        whether a ray that meets glass is reflected
     view_transform : of Blender's colour management, e.g. "AgX", "Standard", "Raw"
     exposure : stops; None = chosen so that the median of the picture becomes a middle grey
+    bounces : of rays from mirrors and through glass; 0 = all surfaces as the bake lights them, glass without refraction
+
+    PictureError where the scene has no camera or nothing that is baked.
     """
     source = bpy.context.scene
+    if not 0 <= bounces <= MOST_BOUNCES:
+        raise PictureError(f"bounces is {bounces}: a picture has from 0 to {MOST_BOUNCES}")
     if source.camera is None:
         raise PictureError(f"scene {source.name} has no camera")
-    copy = _SceneCopy(source)
+    copy = _SceneCopy(source, bounces > 0)
     try:
         scene = copy.scene
-        _set_up(scene, view_transform)
+        if not copy.is_baked:
+            raise PictureError(f"scene {source.name} has nothing to show: no object that is rendered has a bake")
+        _set_up(scene, view_transform, bounces)
         if exposure is None:
             exposure = _automatic_exposure(scene, width, height)
         scene.view_settings.exposure = exposure
@@ -55,10 +74,11 @@ def render(path_png, width=960, height=540, samples=16, view_transform="AgX", ex
 class _SceneCopy:
     """A scene of its own that shows every renderable mesh of another one, wearing lit materials."""
 
-    def __init__(self, source):
-        self._materials = LitMaterials()
+    def __init__(self, source, is_traced):
+        self._materials = LitMaterials(is_traced)
         self._meshes = []
         self._objects = []
+        self.is_baked = False
         self.scene = bpy.data.scenes.new(f"{source.name} picture")
         self.scene.camera = source.camera
         self.scene.world = source.world
@@ -85,6 +105,7 @@ class _SceneCopy:
 
     def _add(self, original, mesh, matrix, materials):
         light = _light_of(original, mesh)
+        self.is_baked |= light != Light()
         for index, material in enumerate(materials):
             lit = self._materials.lit(material, light)
             if index < len(mesh.materials):
@@ -93,6 +114,8 @@ class _SceneCopy:
                 mesh.materials.append(lit)
         obj = bpy.data.objects.new(original.name, mesh)
         obj.matrix_world = matrix
+        for kind in SEEN_BY:
+            setattr(obj, kind, getattr(original, kind))
         self.scene.collection.objects.link(obj)
         self._objects.append(obj)
 
@@ -120,11 +143,14 @@ def _light_of(obj, mesh):
     return Light()
 
 
-def _set_up(scene, view_transform):
+def _set_up(scene, view_transform, bounces):
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.device = "CPU"
-    cycles.max_bounces = 0
+    # after its last bounce a ray still sees what shines, which is all that there is to see
+    cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = max(bounces - 1, 0)
+    cycles.diffuse_bounces = cycles.volume_bounces = 0
+    cycles.sample_clamp_indirect = 0.0
     cycles.transparent_max_bounces = 32
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False

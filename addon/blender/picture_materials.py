@@ -1,6 +1,7 @@
 """Materials that show a bake: each shader becomes the light that it sends back, base colour x (E / pi) + emission.
 
-Works on private copies of the materials, node by node: mixes, textures and groups stay as the artist made them.
+Works on private copies of the materials, node by node: mixes, textures and groups stay as the artist made them. Where
+rays are traced, mirrors and glass come back over it.
 """
 
 from __future__ import annotations
@@ -9,9 +10,11 @@ from dataclasses import dataclass
 
 import bpy
 
+from .picture_rays import GLASS, feed, make_sharp, traced_glass, traced_glossy, traced_principled
 from .read_materials import DIFFUSE, GLOSSY, PASSING, TRANSLUCENT, VELVET
 from .read_mesh import LIGHTMAP_LAYER
 
+MIRRORS = {"BSDF_GLOSSY", "BSDF_METALLIC"}
 LIT = DIFFUSE | VELVET | GLOSSY | TRANSLUCENT  # shaders that the stored light is seen by, and their colours' names
 
 
@@ -30,7 +33,8 @@ class Light:
 class LitMaterials:
     """Copies of materials, one for each pair of material and light; ``remove()`` takes them out of the file again."""
 
-    def __init__(self):
+    def __init__(self, is_traced: bool):
+        self._is_traced = is_traced
         self._made = {}
         self._groups = []
 
@@ -63,10 +67,15 @@ class LitMaterials:
                 self._groups.append(node.node_tree)
                 self._convert(node.node_tree, light)
             elif node.type == "BSDF_PRINCIPLED":
-                _replace(tree, node, _principled(tree, node, light))
+                _replace(tree, node, _principled(tree, node, light, self._is_traced))
             elif node.type in LIT:
                 colour = node.inputs[LIT[node.type]]
-                _replace(tree, node, _reflected(tree, colour, light))
+                lit = _reflected(tree, colour, light)
+                if self._is_traced and node.type in MIRRORS:
+                    lit = traced_glossy(tree, node, LIT[node.type], lit)
+                _replace(tree, node, lit)
+            elif self._is_traced and node.type in GLASS:
+                make_sharp(tree, node)
             elif node.type in PASSING:
                 _replace(tree, node, _transparent(tree, node.inputs["Color"]))
 
@@ -90,20 +99,23 @@ def _replace(tree, node, shader):
     tree.nodes.remove(node)
 
 
-def _principled(tree, node, light):
+def _principled(tree, node, light, is_traced):
     base = node.inputs["Base Color"]
-    reflected = _reflected(tree, base, light)
     # the reader of materials draws the same line: light passes from a transmission of 0.5 on
     if node.inputs["Transmission Weight"].default_value >= 0.5:
-        reflected = _transparent(tree, base)
+        reflected = traced_glass(tree, node) if is_traced else _transparent(tree, base)
+    else:
+        reflected = _reflected(tree, base, light)
+        if is_traced:
+            reflected = traced_principled(tree, node, reflected)
     emitted = tree.nodes.new("ShaderNodeEmission")
-    _feed(tree, node.inputs["Emission Color"], emitted.inputs["Color"])
-    _feed(tree, node.inputs["Emission Strength"], emitted.inputs["Strength"])
+    feed(tree, node.inputs["Emission Color"], emitted.inputs["Color"])
+    feed(tree, node.inputs["Emission Strength"], emitted.inputs["Strength"])
     both = tree.nodes.new("ShaderNodeAddShader")
     tree.links.new(reflected, both.inputs[0])
     tree.links.new(emitted.outputs[0], both.inputs[1])
     cut_out = tree.nodes.new("ShaderNodeMixShader")
-    _feed(tree, node.inputs["Alpha"], cut_out.inputs[0])
+    feed(tree, node.inputs["Alpha"], cut_out.inputs[0])
     tree.links.new(tree.nodes.new("ShaderNodeBsdfTransparent").outputs[0], cut_out.inputs[1])
     tree.links.new(both.outputs[0], cut_out.inputs[2])
     return cut_out.outputs[0]
@@ -113,7 +125,7 @@ def _reflected(tree, colour, light):
     """An emission of colour x light."""
     product = tree.nodes.new("ShaderNodeVectorMath")
     product.operation = "MULTIPLY"
-    _feed(tree, colour, product.inputs[0])
+    feed(tree, colour, product.inputs[0])
     stored = _stored_light(tree, light)
     if stored is None:
         product.inputs[1].default_value = (0.0, 0.0, 0.0)
@@ -142,15 +154,5 @@ def _stored_light(tree, light):
 
 def _transparent(tree, colour):
     shader = tree.nodes.new("ShaderNodeBsdfTransparent")
-    _feed(tree, colour, shader.inputs["Color"])
+    feed(tree, colour, shader.inputs["Color"])
     return shader.outputs[0]
-
-
-def _feed(tree, source, target):
-    """Give ``target`` the link or the value of the input ``source``."""
-    if source.is_linked:
-        tree.links.new(source.links[0].from_socket, target)
-    elif hasattr(target.default_value, "__len__"):
-        target.default_value = tuple(source.default_value)[: len(target.default_value)]
-    else:
-        target.default_value = source.default_value

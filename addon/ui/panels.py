@@ -47,6 +47,7 @@ class PATCHLIGHT_PT_bake(_Sidebar, bpy.types.Panel):
             row = layout.row()
             row.scale_y = 1.5
             row.operator("patchlight.bake", icon="LIGHT_AREA")
+            layout.operator("patchlight.preview", icon="IMAGE_DATA")
         if state.has_result:
             _draw_result(layout, state)
 

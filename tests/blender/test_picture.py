@@ -98,7 +98,16 @@ def test_emission_is_added(wall, tmp_path):
 
 
 def test_what_is_not_baked_is_black_under_any_sun(wall, tmp_path):
+    other = bpy.data.objects.new("baked", bpy.data.meshes.new("baked"))
+    other.data.from_pydata([(0, 0, 5), (1, 0, 5), (0, 1, 5)], [], [(0, 1, 2)])
+    other.data.color_attributes.new("Patchlight", "FLOAT_COLOR", "CORNER")
+    bpy.context.scene.collection.objects.link(other)
     assert _shown(tmp_path).max() <= PNG_LEVELS
+
+
+def test_a_scene_without_a_bake_is_refused(wall, tmp_path):
+    with pytest.raises(picture.PictureError, match="Scene has nothing to show"):
+        _shown(tmp_path)
 
 
 def test_a_mix_of_shaders_inside_a_group_is_shown(wall, tmp_path):
@@ -140,11 +149,13 @@ def test_a_scene_without_camera_is_refused_by_name(wall, tmp_path):
         picture.render(tmp_path / "picture.png")
 
 
-def test_the_file_is_left_as_it_was(tmp_path):
+@pytest.mark.parametrize("bounces", [0, 2])
+def test_the_file_is_left_as_it_was(tmp_path, bounces):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     demo.build_room()
+    bpy.data.objects["rug"].data.color_attributes.new("Patchlight", "FLOAT_COLOR", "CORNER")
     before = _contents()
-    picture.render(tmp_path / "picture.png", width=32, height=18, samples=1)
+    picture.render(tmp_path / "picture.png", width=32, height=18, samples=1, bounces=bounces)
     assert _contents() == before
 
 

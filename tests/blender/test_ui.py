@@ -7,6 +7,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from addon import registration  # noqa: E402 - needs bpy
+from addon.blender import picture  # noqa: E402
 from addon.core.settings import METHODS, SOLVERS, TARGETS, BakeCancelled, BakeSettings  # noqa: E402
 from addon.ui.job import BakeJob  # noqa: E402
 from addon.ui.properties import PATCHLIGHT_PG_settings  # noqa: E402
@@ -212,3 +213,32 @@ def test_a_job_hands_over_its_result():
     job.run()
     assert job.result == ("scene", "settings")
     assert job.error is None
+
+
+# ---- preview ----
+
+
+def test_a_preview_shows_the_bake_and_is_not_saved(room):
+    _add_camera()
+    assert bpy.ops.patchlight.bake() == {"FINISHED"}
+    objects = len(bpy.data.objects)
+    for bounces in (0, 2):
+        assert bpy.ops.patchlight.preview(bounces=bounces) == {"FINISHED"}
+        image = bpy.data.images["Patchlight Preview"]
+        assert (max(image.size), image.users) == (picture.LONGER_SIDE, 0)
+        assert max(image.pixels[:4000]) > 0
+    assert len(bpy.data.objects) == objects
+    assert [image.name for image in bpy.data.images].count("Patchlight Preview") == 1
+
+
+def test_a_preview_of_nothing_is_refused(room):
+    assert not bpy.ops.patchlight.preview.poll(), "no camera"
+    _add_camera()
+    with pytest.raises(RuntimeError, match="has nothing to show"):
+        bpy.ops.patchlight.preview()
+
+
+def _add_camera():
+    scene = bpy.context.scene
+    scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(scene.camera)

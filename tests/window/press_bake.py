@@ -1,4 +1,4 @@
-"""The extension in a real Blender window: its zip is installed, Bake is pressed, watched, undone, and cancelled by Esc.
+"""The extension in a real Blender window: its zip is installed, Bake is pressed, watched, shown, undone, and cancelled.
 
     blender --factory-startup --enable-event-simulate --python tests/window/press_bake.py -- ZIP
 
@@ -42,9 +42,17 @@ def steps():
     yield
 
     with in_3d_view(window):
+        check("Preview renders", bpy.ops.patchlight.preview("INVOKE_DEFAULT", True) == {"FINISHED"})
+    yield
+    check("an Image Editor shows it", shown_images() == ["Patchlight Preview"])
+    with in_3d_view(window):
         bpy.ops.ed.undo()
     yield
-    check("one undo takes it all back", contents() == before and lightmaps() == [])
+
+    with in_3d_view(window):
+        bpy.ops.ed.undo()
+    yield
+    check("undo takes it all back", contents() == before and lightmaps() == [])
 
     press_bake(window)
     while not state().progress > 0:
@@ -108,6 +116,12 @@ def contents():
 def lightmaps():
     """Names of the objects that have one."""
     return sorted(ob.name for ob in bpy.data.objects if ob.get("patchlight_lightmap"))
+
+
+def shown_images():
+    """Names of what Image Editors show."""
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    return [area.spaces.active.image.name for area in areas if area.type == "IMAGE_EDITOR"]
 
 
 def state():

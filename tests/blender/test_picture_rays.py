@@ -1,0 +1,164 @@
+"""Mirrors and glass in the picture of a bake: laws of reflection and refraction with one answer each."""
+
+import bpy
+import numpy as np
+import pytest
+
+from addon.blender import picture, picture_rays
+
+# Levels of an 8-bit PNG: half a one is rounding, one is the reach of Blender's triangular dither
+PNG_LEVELS = 1.5 / 255
+LIGHT = 0.5  # E / pi on the wall behind the camera
+
+
+@pytest.fixture
+def facing():
+    """Two walls, the camera between them: it looks at one whose base colour is white and that no light reaches, with
+    its back to one of base colour .8 that has LIGHT."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    ahead, behind = _wall("ahead", -1.0, 0.0), _wall("behind", 1.0, LIGHT)
+    behind.data.materials.append(_principled(0.8, roughness=1.0))
+    scene.camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    scene.collection.objects.link(scene.camera)
+    scene.camera.data.angle = np.radians(2)  # all of it along the walls' normals: what is reflected is F(0)
+    return ahead
+
+
+def _wall(name, z, light, size=100.0):
+    mesh = bpy.data.meshes.new(name)
+    x = size / 2
+    mesh.from_pydata([(-x, -x, 0), (x, -x, 0), (x, x, 0), (-x, x, 0)], [], [(0, 1, 2, 3)])
+    attribute = mesh.color_attributes.new("Patchlight", "FLOAT_COLOR", "CORNER")
+    attribute.data.foreach_set("color", np.tile(np.array([light, light, light, 1], np.float32), 4))
+    obj = bpy.data.objects.new(name, mesh)
+    obj.location.z = z
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
+
+
+def _principled(colour=1.0, **inputs):
+    material = bpy.data.materials.new("made")
+    material.use_nodes = True
+    node = material.node_tree.nodes["Principled BSDF"]
+    node.inputs["Base Color"].default_value = (colour, colour, colour, 1)
+    for name, value in inputs.items():
+        node.inputs[name.replace("_", " ").title().replace("Ior", "IOR")].default_value = value
+    return material
+
+
+def _wear(obj, material):
+    obj.data.materials.clear()
+    obj.data.materials.append(material)
+
+
+def _seen(tmp_path, bounces=4, scale=1.0, samples=4):
+    """The mean of what the camera sees, times ``scale`` to use the PNG's range."""
+    path = tmp_path / "picture.png"
+    exposure = float(np.log2(scale))
+    picture.render(path, 16, 16, samples, view_transform="Raw", exposure=exposure, bounces=bounces)
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name = "Non-Color"
+    pixels = np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
+    bpy.data.images.remove(image)
+    return pixels.mean() / scale
+
+
+def test_a_mirror_shows_what_it_faces_times_its_colour(facing, tmp_path):
+    _wear(facing, _principled(0.9, metallic=1.0, roughness=0.0))
+    assert _seen(tmp_path) == pytest.approx(0.9 * 0.8 * LIGHT, abs=PNG_LEVELS)
+
+
+def test_without_bounces_a_mirror_is_as_the_bake_lights_it(facing, tmp_path):
+    _wear(facing, _principled(0.9, metallic=1.0, roughness=0.0))
+    assert _seen(tmp_path, bounces=0) <= PNG_LEVELS
+
+
+@pytest.mark.parametrize("ior", [1.33, 1.5, 2.0])
+def test_a_smooth_dielectric_reflects_as_fresnel_says(facing, tmp_path, ior):
+    _wear(facing, _principled(roughness=0.0, ior=ior))
+    assert _seen(tmp_path, scale=16) == pytest.approx(((ior - 1) / (ior + 1)) ** 2 * 0.8 * LIGHT, abs=PNG_LEVELS / 16)
+
+
+def test_what_a_dielectric_reflects_is_missing_from_what_the_bake_shows(facing, tmp_path):
+    _wear(facing, _principled(roughness=0.0, ior=2.0))
+    facing.data.color_attributes["Patchlight"].data.foreach_set("color", np.full(16, 0.9, np.float32))
+    share = 1 / 9  # ((2 - 1) / (2 + 1))^2
+    assert _seen(tmp_path) == pytest.approx(share * 0.8 * LIGHT + (1 - share) * 0.9, abs=PNG_LEVELS)
+
+
+def test_a_coat_is_a_mirror_of_its_own(facing, tmp_path):
+    _wear(facing, _principled(roughness=1.0, coat_weight=0.5, coat_ior=2.0, coat_roughness=0.0))
+    assert _seen(tmp_path, scale=16) == pytest.approx(0.5 / 9 * 0.8 * LIGHT, abs=PNG_LEVELS / 16)
+
+
+@pytest.mark.parametrize("is_linked", [False, True])
+@pytest.mark.parametrize(("roughness", "left"), [(0.0, 1.0), (picture_rays.ROUGH / 4, 0.75), (picture_rays.ROUGH, 0.0)])
+def test_a_mirror_fades_with_roughness(facing, tmp_path, roughness, left, is_linked):
+    material = _principled(metallic=1.0, roughness=roughness)
+    if is_linked:
+        tree = material.node_tree
+        value = tree.nodes.new("ShaderNodeValue")
+        value.outputs[0].default_value = roughness
+        tree.links.new(value.outputs[0], tree.nodes["Principled BSDF"].inputs["Roughness"])
+    _wear(facing, material)
+    assert _seen(tmp_path) == pytest.approx(left * 0.8 * LIGHT, abs=PNG_LEVELS)
+
+
+@pytest.mark.parametrize("name", ["ShaderNodeBsdfAnisotropic", "ShaderNodeBsdfMetallic"])
+def test_glossy_shaders_are_mirrors(facing, tmp_path, name):
+    material = _principled()
+    tree = material.node_tree
+    shader = tree.nodes.new(name)
+    shader.inputs[0].default_value = (0.9, 0.9, 0.9, 1)
+    shader.inputs["Roughness"].default_value = 0.0
+    tree.links.new(shader.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    _wear(facing, material)
+    assert _seen(tmp_path) == pytest.approx(0.9 * 0.8 * LIGHT, abs=PNG_LEVELS)
+
+
+def test_two_mirrors_take_two_bounces(facing, tmp_path):
+    """A valley of two mirrors at right angles sends a ray back where it came from, by way of both."""
+    for mirror, turn in ((facing, -45), (_wall("other", 0.0, 0.0), 45)):
+        _wear(mirror, _principled(metallic=1.0, roughness=0.0))
+        mirror.rotation_euler.y = np.radians(turn)
+        mirror.location = (-np.sign(turn) * 35.3, 0.0, -20.0)  # 100 / sqrt(8): they meet below the camera
+    assert _seen(tmp_path, bounces=2) == pytest.approx(0.8 * LIGHT, abs=PNG_LEVELS)
+    assert _seen(tmp_path, bounces=1) <= PNG_LEVELS
+
+
+@pytest.mark.parametrize("kind", ["principled", "glass"])
+def test_a_pane_lets_through_what_all_its_reflections_leave(facing, tmp_path, kind):
+    """Of a slab, (1 - R) / (1 + R) by the sum over the paths within it, R = ((n - 1) / (n + 1))^2; Born & Wolf 7.6."""
+    facing.data.color_attributes["Patchlight"].data.foreach_set("color", np.full(16, 0.9, np.float32))
+    _wear(facing, _principled(1.0, roughness=1.0))
+    bpy.data.objects["behind"].data.color_attributes["Patchlight"].data.foreach_set("color", np.zeros(16, np.float32))
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0, 0, -0.5))
+    pane = bpy.context.object
+    pane.scale = (50.0, 50.0, 0.1)
+    pane.data.color_attributes.new("Patchlight", "FLOAT_COLOR", "CORNER")
+    material = _principled(1.0, roughness=0.3, ior=2.0, transmission_weight=1.0)
+    if kind == "glass":
+        tree = material.node_tree
+        glass = tree.nodes.new("ShaderNodeBsdfGlass")
+        glass.inputs["IOR"].default_value, glass.inputs["Roughness"].default_value = 2.0, 0.3
+        tree.links.new(glass.outputs[0], tree.nodes["Material Output"].inputs["Surface"])
+    _wear(pane, material)
+    reflected = 1 / 9
+    # a ray is reflected or goes on by chance: 256 pixels of 64 such rays know a mean to .9 * .4 / 128 = .003
+    expected = 0.9 * (1 - reflected) / (1 + reflected)
+    assert _seen(tmp_path, bounces=16, samples=64) == pytest.approx(expected, abs=PNG_LEVELS + 0.006)
+
+
+def test_what_the_camera_does_not_see_is_seen_in_mirrors(facing, tmp_path):
+    _wear(facing, _principled(metallic=1.0, roughness=0.0))
+    screen = _wall("screen", -0.5, 0.0)
+    screen.visible_camera = screen.visible_glossy = False
+    assert _seen(tmp_path) == pytest.approx(0.8 * LIGHT, abs=PNG_LEVELS)
+    screen.visible_glossy = True
+    assert _seen(tmp_path) <= PNG_LEVELS
+
+
+def test_bounces_out_of_range_are_refused(facing, tmp_path):
+    with pytest.raises(picture.PictureError, match="bounces is -1"):
+        _seen(tmp_path, bounces=-1)
