@@ -68,8 +68,9 @@ bake: kernel
 	@echo; echo "Pictures lit by nothing but the bake, and the lightmaps they show:"
 	@for demo in $(DEMOS); do echo "  $(OUT)/$$demo.png   $(OUT)/$${demo}_lightmap.png"; done
 
+# in up to four processes: most of what a test does has one thread
 test: kernel
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --maxprocesses 4 --dist worksteal
 
 # BENCH_OPTIONS= on the command line measures with the whole range of settings, which takes minutes
 BENCH_OPTIONS := --quick

@@ -22,7 +22,8 @@ CORE_ORDER = (
     *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides", "gather_sums"),
     *("vertex_graph", "vertices"),
     *("patch_solution", "patch_light", "decomposition", "choose", "laws", "radiosity"),
-    *("charts", "copies", "blocks", "cut", "flatten", "packing", "unwrap", "texels", "gaps", "smoothing", "probes"),
+    *("charts", "copies", "blocks", "cut", "flatten", "packing", "unwrap", "texels"),
+    *("lookup", "seams", "gaps", "smoothing", "probes"),
     *(
         "denoiser",
         "denoising",

@@ -19,6 +19,7 @@ from .radiosity import MOST_REFLECTANCE, UNSHOT_LIMIT, Solved, solve_radiosity
 from .receivers import surface_receivers
 from .report import Report
 from .scene import Scene, SceneError, radiance_from_exitance
+from .seams import find_seams
 from .settings import BakeSettings
 from .sky import with_suns
 from .smoothing import texel_grid
@@ -73,6 +74,7 @@ def bake(
         if settings.target == "lightmap":
             receivers, grid, seen, rects = _on_texels(scene, settings, progress)
             kernel = KernelScene(scene, workers)
+            grid = replace(grid, seams=find_seams(scene, kernel, grid.uvs, grid.receivers))
         else:
             progress.begin("texels")
             kernel = KernelScene(scene, workers)

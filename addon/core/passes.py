@@ -164,8 +164,9 @@ def gather_until(
         if stopped is not None:
             if not is_asked and needs_denoising(found.rms, error):
                 found = _denoised(denoise, job, grid, found, samples, direct, probes)
-            traced = samples.rays, probes.measured.rays
-            return Gathered(found.values, found.rms, stopped, found.is_denoised, *traced)
+            values = grid.stitched(found.values)
+            rms, traced = rms_of(probes.squares_of(values)), (samples.rays, probes.measured.rays)
+            return Gathered(values, rms, stopped, found.is_denoised, *traced)
         del found, scales  # a fine lightmap's are a gigabyte, which the next estimate needs
 
 

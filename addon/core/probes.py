@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .emitters import LUMINANCE
+from .lookup import bilinear
 from .receivers import Receivers, surface_receivers
 from .relative import scale_of
 from .scene import Scene
@@ -111,26 +112,12 @@ def seen_through_lightmap(scene: Scene, cells: np.ndarray, uvs: np.ndarray, seed
 
     ``cells`` int32 (H, W) is the receiver that each texel is, -1 for none, ``uvs`` the corners' in texels (T, 3, 2).
     """
-    height, width = cells.shape
     is_laid_out = np.isfinite(uvs).all(axis=(1, 2))
     count = probe_count(np.count_nonzero(cells >= 0))
     triangles, barycentrics = _random_points(scene, is_laid_out, count, seed)
-    places = np.einsum("nk,nkc->nc", barycentrics, uvs[triangles].astype(np.float64)) - 0.5
-    low = np.floor(places).astype(np.int64)
-    shares = places - low
-    indices, weights = [], []
-    for row in (0, 1):
-        for column in (0, 1):
-            x = np.clip(low[:, 0] + column, 0, width - 1)
-            y = np.clip(low[:, 1] + row, 0, height - 1)
-            across = shares[:, 0] if column else 1 - shares[:, 0]
-            weight = across * (shares[:, 1] if row else 1 - shares[:, 1])
-            indices.append(np.maximum(cells[y, x], 0))
-            weights.append(np.where(cells[y, x] >= 0, weight, 0.0))
-    indices, weights = np.stack(indices, axis=1), np.stack(weights, axis=1)
-    weights /= np.maximum(weights.sum(axis=1, keepdims=True), 1e-12)
+    texels, shares = bilinear(cells, np.einsum("nk,nkc->nc", barycentrics, uvs[triangles].astype(np.float64)))
     receivers = surface_receivers(scene, triangles, barycentrics)
-    return SeenPoints(receivers, lambda values: np.einsum("nk,nkc->nc", weights, values[indices]))
+    return SeenPoints(receivers, lambda values: np.einsum("nk,nkc->nc", shares, values[texels]))
 
 
 def seen_through_corners(scene: Scene, graph: VertexGraph, seed: int) -> SeenPoints:

@@ -17,6 +17,7 @@ from .gather_sums import LARGEST_VARIANCE
 from .kernel import clamp_outliers, smooth
 from .receivers import Receivers
 from .scene import Scene
+from .seams import NO_SEAMS, Seams
 from .texels import TexelMap
 from .textures import scattered_shares
 from .workers import Workers
@@ -39,6 +40,7 @@ class TexelGrid:
     reflectance : float32 (N, 3) of the receivers
     translucence : float32 (N, 3) of the receivers, None where it is 0 everywhere
     shown : float32 (N,) how much of the surface looks each receiver up, relative to the mean
+    seams : over which the surface goes on
     """
 
     is_image: ClassVar[bool] = True
@@ -48,6 +50,7 @@ class TexelGrid:
     reflectance: np.ndarray
     translucence: np.ndarray | None
     shown: np.ndarray
+    seams: Seams = NO_SEAMS
 
     @property
     def value_count(self) -> int:
@@ -55,7 +58,7 @@ class TexelGrid:
         return len(self.shown)
 
     def part(self, chosen) -> TexelGrid:
-        """The same of some of the receivers (M,)."""
+        """The same of some of the receivers (M,), without seams."""
         places = np.full(len(self.shown) + 1, -1, np.int32)  # of none, -1, the last
         places[chosen] = np.arange(len(chosen))
         shown = self.shown[chosen] / max(self.shown[chosen].mean(), 1e-30)
@@ -66,6 +69,10 @@ class TexelGrid:
     def stored(self, receiver_values):
         """Values per receiver (N, C) as they are stored: each texel has its own."""
         return receiver_values
+
+    def stitched(self, values):
+        """Irradiance (N, 3) as it is shown: the same on both sides of seams."""
+        return self.seams.stitched(values)
 
     def members(self, chosen):
         """Receivers of chosen values (M,), where each value's start among them (M,), and their shares in it (M,)."""

@@ -63,6 +63,10 @@ class VertexGraph:
         """Values per receiver (N, C), each replaced by that of the value it is part of."""
         return self._means(receiver_values)[self.owners]
 
+    def stitched(self, values):
+        """Irradiance (N, 3) as it is shown: corners of faces that go on have one value as it is."""
+        return values
+
     def members(self, chosen):
         """Receivers of chosen values (M,), where each value's start among them (K,), and their shares in it (M,)."""
         members = np.flatnonzero(np.isin(self.owners, chosen))
