@@ -24,8 +24,8 @@ BEYOND, LIFT = 0.05, 0.1  # texels beyond the edge and above it, from where a ra
 LEVEL = 0.02  # which lies as high as this, up or down,
 SAME_NORMAL = np.cos(np.radians(1.5))  # and faces the same way
 APART = 0.5  # texels; what is looked up nearer to each other has no seam
-STAY = 0.1  # what a texel's change costs, beside a difference between the sides, both by the light there: with this
-# differences of a tenth of the light become a fortieth of that; with less, texels swing to and fro along the seam
+STAY = 0.05  # what a texel's change costs, beside a difference between the sides, both by the light there: with this
+# a fortieth is left of differences; with less, texels swing to and fro along the seam
 LEAST_LIGHT = 1e-3  # of the median: what is darker is as easily changed
 MOST_STEPS, PRECISE = 100, 1e-3  # of conjugate gradients: these end at so much of what there was to do
 
