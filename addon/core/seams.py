@@ -27,7 +27,7 @@ APART = 0.5  # texels; what is looked up nearer to each other has no seam
 STAY = 0.05  # what a texel's change costs, beside a difference between the sides, both by the light there: with this
 # a fortieth is left of differences; with less, texels swing to and fro along the seam
 LEAST_LIGHT = 1e-3  # of the median: what is darker is as easily changed
-MOST_STEPS, PRECISE = 100, 1e-3  # of conjugate gradients: these end at so much of what there was to do
+MOST_STEPS, PRECISE = 100, 1e-4  # of conjugate gradients: these end at so much of what there was to do
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,7 +125,7 @@ def test_stitched_is_the_least_change_by_least_squares():
     wanted = np.vstack([-(rows @ values) / typical[:, None], np.zeros((40, 3))])
     change = np.linalg.lstsq(system, wanted, rcond=None)[0]
     assert (values + change > 0).all(), "nothing to clip"
-    # conjugate gradients end at a thousandth of the change
+    # conjugate gradients end at 1e-4 of what is to do; what is hardest to change, by STAY, has some ten times more left
     assert np.abs(seams.stitched(values) - values - change).max() < 3e-3 * np.abs(change).max()
 
 
