@@ -23,7 +23,7 @@ CORE_ORDER = (
     *("vertex_graph", "vertices"),
     *("patch_solution", "patch_light", "decomposition", "choose", "laws", "radiosity"),
     *("charts", "copies", "blocks", "cut", "flatten", "packing", "unwrap", "texels"),
-    *("lookup", "seams", "gaps", "smoothing", "probes"),
+    *("lookup", "seams", "find_seams", "gaps", "smoothing", "probes"),
     *(
         "denoiser",
         "denoising",

@@ -11,6 +11,7 @@ from .backs import translucent_backs, with_backs
 from .denoiser import open_denoiser
 from .denoising import needs_denoising
 from .emitters import emitters_of
+from .find_seams import find_seams
 from .gather import Irradiance, gather_irradiance
 from .kernel import KernelScene
 from .lightmap import Lightmap, assemble
@@ -19,7 +20,6 @@ from .radiosity import MOST_REFLECTANCE, UNSHOT_LIMIT, Solved, solve_radiosity
 from .receivers import surface_receivers
 from .report import Report
 from .scene import Scene, SceneError, radiance_from_exitance
-from .seams import find_seams
 from .settings import BakeSettings
 from .sky import with_suns
 from .smoothing import texel_grid

@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from addon.core import bake as bake_module
 from addon.core.bake import bake
+from addon.core.find_seams import find_seams
 from addon.core.scene import PointLight
-from addon.core.seams import NO_SEAMS, STAY, Seams, find_seams
+from addon.core.seams import NO_SEAMS, STAY, Seams
 from addon.core.settings import BakeSettings
 from addon.core.texels import texels
 from addon.core.unwrap import unwrap
@@ -56,6 +57,15 @@ def test_panels_that_meet_have_a_seam_there_and_nowhere_else():
     assert seams.shares.sum(axis=1) == pytest.approx(0.0, abs=1e-12)
     is_left = places[..., 0] < 1
     assert (is_left[:, :4].all(axis=1) ^ is_left[:, 4:].all(axis=1)).all(), "four texels of one side, four of the other"
+
+
+def test_in_parts_no_point_is_lost(monkeypatch):
+    whole = laid_out(panels())[2]
+    monkeypatch.setattr("addon.core.find_seams.BLOCK", 20)
+    parts = laid_out(panels())[2]
+    # each part begins its own steps: up to one point more or less on each of some 20 of them
+    assert len(parts.receivers) == pytest.approx(len(whole.receivers), abs=20)
+    assert set(np.unique(parts.receivers)) == set(np.unique(whole.receivers))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,150 @@
+"""Find the seams of a lightmap: rays look for what lies beyond the borders of its charts.
+
+So that charts, objects and T-junctions are one, a wall that stands on a seam parts it, and what lies beside the surface
+or under it is not what goes on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernel import KernelScene
+from .lookup import bilinear
+from .receivers import surface_receivers
+from .scene import Scene
+from .seams import NO_SEAMS, Seams
+
+SAME_UV = 1 / 1024  # texels: what edges of triangles that lie beside each other in a chart may differ by
+BLOCK = 1 << 18  # triangles, or points on edges, at once
+STEP = 1.0  # texels between points along a seam, from each side
+BEYOND, LIFT = 0.05, 0.1  # texels beyond the edge and above it, from where a ray looks for the other side,
+LEVEL = 0.02  # which lies as high as this, up or down,
+SAME_NORMAL = np.cos(np.radians(1.5))  # and faces the same way
+APART = 0.5  # texels; what is looked up nearer to each other has no seam
+
+
+def find_seams(scene: Scene, kernel: KernelScene, uvs, cells) -> Seams:
+    """The seams of a lightmap: ``uvs`` float32 (T, 3, 2) of the scene's triangles' corners, in texels, NaN without a
+    place; ``cells`` int32 (H, W) is the receiver that each texel is, -1 for none."""
+    triangles, corners = _borders(uvs)
+    lengths = np.linalg.norm(_ahead(uvs, triangles, corners), axis=1)
+    parts = np.cumsum(lengths) // (BLOCK * STEP)
+    seams = [
+        _seams_along(scene, kernel, uvs, cells, triangles[parts == part], corners[parts == part])
+        for part in np.unique(parts)
+    ]
+    return Seams(*(np.concatenate(arrays) for arrays in zip((NO_SEAMS.receivers, NO_SEAMS.shares), *seams)))
+
+
+def _seams_along(scene, kernel, uvs, cells, triangles, corners):
+    """Receivers (M, 8) and shares (M, 8) of points on edges, as Seams has them."""
+    triangles, weights, outwards = _points_along(scene, uvs, triangles, corners)
+    others, other_weights, found = _other_sides(scene, kernel, uvs, triangles, weights, outwards)
+    triangles, weights = triangles[found], weights[found]
+    normal = surface_receivers(scene, triangles, weights).normals
+    other_normal = surface_receivers(scene, others, other_weights).normals
+    here, there = _places(uvs, triangles, weights), _places(uvs, others, other_weights)
+    is_seam = np.einsum("nc,nc->n", normal, other_normal) > SAME_NORMAL
+    is_seam &= ((here - there) ** 2).sum(axis=1) > APART**2
+    receivers, shares = bilinear(cells, here[is_seam])
+    other_receivers, other_shares = bilinear(cells, there[is_seam])
+    return np.hstack([receivers, other_receivers]), np.hstack([shares, -other_shares])
+
+
+def _borders(uvs):
+    """Edges that only one triangle has in the lightmap: triangles (E,), and the corners (E,) that they start from."""
+    triangles = np.flatnonzero(np.isfinite(uvs).all(axis=(1, 2)))
+    starts = np.empty((len(triangles), 3), np.uint64)
+    for first in range(0, len(triangles), BLOCK):
+        block = slice(first, first + BLOCK)
+        places = np.round(uvs[triangles[block]].astype(np.float64) / SAME_UV).astype(np.int64)
+        starts[block] = _mixed((places[..., 0] << 32) + places[..., 1])
+    # of both ends, whichever comes first; one in 10^6 bakes of 10^7 edges takes two for one and leaves a point out
+    edges = starts + np.roll(starts, -1, axis=1)
+    edges[starts == np.roll(starts, -1, axis=1)] = 0  # without a length
+    order = np.argsort(edges, axis=None)
+    is_new = np.append(True, np.diff(edges.ravel()[order]) != 0)
+    alone = np.sort(order[is_new & np.append(is_new[1:], True)])
+    alone = alone[edges.ravel()[alone] != 0]
+    return triangles[alone // 3], alone % 3
+
+
+def _mixed(numbers):
+    """Numbers int64 as evenly spread ones, uint64 (the end of SplitMix64: Steele, Lea & Flood 2014)."""
+    mixed = numbers.astype(np.uint64)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        mixed = (mixed ^ (mixed >> np.uint64(shift))) * np.uint64(factor)
+    return mixed ^ (mixed >> np.uint64(31))
+
+
+def _points_along(scene, uvs, triangles, corners):
+    """Points on edges, a texel or so apart over all of them: triangles (N,), barycentrics (N, 3), and a texel's length
+    out of the triangle there (N, 3) [m]."""
+    ends, lengths = (corners + 1) % 3, np.linalg.norm(_ahead(uvs, triangles, corners), axis=1)
+    until = np.cumsum(lengths) / STEP
+    begin = np.append(0.0, until[:-1])
+    # one in the middle of every step along all edges end to end: short ones have some together
+    first = np.ceil(begin - 0.5).astype(np.int64)
+    counts = np.maximum(np.ceil(until - 0.5).astype(np.int64) - first, 0)
+    edges = np.repeat(np.arange(len(triangles)), counts)
+    steps = np.arange(len(edges)) - np.repeat(np.cumsum(counts) - counts, counts) + first[edges] + 0.5
+    share = (steps - begin[edges]) / np.maximum(until - begin, 1e-300)[edges]
+    weights = np.zeros((len(edges), 3))
+    points = np.arange(len(edges))
+    weights[points, corners[edges]], weights[points, ends[edges]] = 1 - share, share
+    triangles = triangles[edges]
+    at_corners = _corners(scene, triangles)
+    along = at_corners[points, ends[edges]] - at_corners[points, corners[edges]]
+    length = np.linalg.norm(along, axis=1)
+    texel = length / np.maximum(lengths, 1e-300)[edges]
+    outwards = np.cross(along / np.maximum(length, 1e-300)[:, None], _flat_normals(scene, triangles))
+    return triangles, weights, texel[:, None] * outwards
+
+
+def _other_sides(scene, kernel, uvs, triangles, weights, outwards):
+    """What lies beyond the points (N,): triangles (M,), barycentrics (M, 3), and of which points (M,)."""
+    normals = _flat_normals(scene, triangles)
+    texel = np.linalg.norm(outwards, axis=1, keepdims=True)
+    points = np.einsum("nk,nkc->nc", weights, _corners(scene, triangles))
+    above = points + LIFT * texel * normals
+    there = above + BEYOND * outwards
+    others, hits = kernel.closest_hits(there, -normals)
+    found = others >= 0
+    found &= np.isfinite(uvs).all(axis=(1, 2))[others] & (others != triangles)
+    found &= np.abs(hits[:, 2] - LIFT * texel[:, 0]) < LEVEL * texel[:, 0]
+    found = np.flatnonzero(found)
+    # what lies on this side of the edge, too, is another layer and not what goes on
+    inside = _weights_at(_corners(scene, others[found]), (points - BEYOND * outwards)[found])
+    found = found[inside.min(axis=1) < 0]
+    # a wall on the seam parts the light
+    found = found[~kernel.occluded((above - BEYOND * outwards)[found], there[found])]
+    others, hits = others[found], hits[found].astype(np.float64)
+    return others, np.stack([1 - hits[:, 0] - hits[:, 1], hits[:, 0], hits[:, 1]], axis=1), found
+
+
+def _weights_at(corners, points):
+    """Barycentrics (N, 3) of points' feet in the planes of triangles (N, 3, 3)."""
+    u, v, ahead = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0], points - corners[:, 0]
+    uu, uv, vv, au, av = (np.einsum("nc,nc->n", a, b) for a, b in ((u, u), (u, v), (v, v), (ahead, u), (ahead, v)))
+    determinant = np.maximum(uu * vv - uv * uv, 1e-300)
+    second, third = (vv * au - uv * av) / determinant, (uu * av - uv * au) / determinant
+    return np.stack([1 - second - third, second, third], axis=1)
+
+
+def _corners(scene, triangles):
+    return scene.vertices[scene.triangles[triangles]]  # scene.corners are those of all
+
+
+def _flat_normals(scene, triangles):
+    corners = _corners(scene, triangles)
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+
+
+def _ahead(uvs, triangles, corners):
+    """From corners to the next of their triangles (E, 2) [texels]."""
+    return uvs[triangles, (corners + 1) % 3].astype(np.float64) - uvs[triangles, corners]
+
+
+def _places(uvs, triangles, weights):
+    return np.einsum("nk,nkc->nc", weights, uvs[triangles].astype(np.float64))
