@@ -54,15 +54,17 @@ def translucent_backs(
     return Backs(chosen, shares.astype(np.float32), _behind(scene, before), grid)
 
 
-def with_backs(front: Irradiance, backs: Backs, kernel, solved, error, seed, seconds_left, on_step) -> Irradiance:
+def with_backs(front: Irradiance, backs: Backs, grid, kernel, solved, error, seed, seconds_left, on_step) -> Irradiance:
     """The irradiance of the fronts, where they are translucent mixed with that of the backs as they show it:
-    (rho E_front + tau E_back) / (rho + tau). The error that is seen stays that of the fronts.
+    (rho E_front + tau E_back) / (rho + tau). The error that is seen stays that of the fronts, whose
+    ``grid`` has the seams.
     """
     behind = gather_irradiance(
         kernel, solved, backs.receivers, backs.grid, None, error, seed, None, seconds_left, on_step
     )
     values = front.values.copy()
     values[backs.chosen] += backs.shares * (behind.values - values[backs.chosen])
+    values = grid.stitched(values)
     return replace(
         front,
         values=values,

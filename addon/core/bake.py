@@ -74,7 +74,8 @@ def bake(
         if settings.target == "lightmap":
             receivers, grid, seen, rects = _on_texels(scene, settings, progress)
             kernel = KernelScene(scene, workers)
-            grid = replace(grid, seams=find_seams(scene, kernel, grid.uvs, grid.receivers))
+            seams = find_seams(scene, kernel, receivers, grid.uvs, grid.receivers, progress.poll)
+            grid = replace(grid, seams=seams)
         else:
             progress.begin("texels")
             kernel = KernelScene(scene, workers)
@@ -94,7 +95,7 @@ def bake(
         )  # fmt: skip
         if backs is not None:
             how = settings.error, settings.seed, seconds_left, lambda done: progress.poll()
-            irradiance = with_backs(irradiance, backs, kernel, solved, *how)
+            irradiance = with_backs(irradiance, backs, grid, kernel, solved, *how)
 
         progress.begin("texels")
         lightmap = corner_colours = None

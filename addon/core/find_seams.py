@@ -1,7 +1,7 @@
 """Find the seams of a lightmap: rays look for what lies beyond the borders of its charts.
 
-So that charts, objects and T-junctions are one, a wall that stands on a seam parts it, and what lies beside the surface
-or under it is not what goes on.
+So that charts, objects and T-junctions are one, and what lies beside the surface or under it is not what goes on. Nor is
+there a seam where a wall stands on it or beside it: what is looked up there is light of both sides of the wall.
 """
 
 from __future__ import annotations
@@ -10,45 +10,67 @@ import numpy as np
 
 from .kernel import KernelScene
 from .lookup import bilinear
-from .receivers import surface_receivers
+from .receivers import Receivers, surface_receivers
 from .scene import Scene
 from .seams import NO_SEAMS, Seams
 
 SAME_UV = 1 / 1024  # texels: what edges of triangles that lie beside each other in a chart may differ by
 BLOCK = 1 << 18  # triangles, or points on edges, at once
-STEP = 1.0  # texels between points along a seam, from each side
+STEP = 1.0  # texels between points along a seam, from each side; more, where that would be more than
+MOST_POINTS = 1 << 20  # in all, as where each face is a chart
 BEYOND, LIFT = 0.05, 0.1  # texels beyond the edge and above it, from where a ray looks for the other side,
-LEVEL = 0.02  # which lies as high as this, up or down,
-SAME_NORMAL = np.cos(np.radians(1.5))  # and faces the same way
+DEPTH = 0.3  # no farther down,
+LEVEL = 0.02  # whose plane the edge is off by no more
+SAME_NORMAL = np.cos(np.radians(1.5))  # of shading, of both sides
 APART = 0.5  # texels; what is looked up nearer to each other has no seam
+SIGHT = 0.5  # texels above the surface, from where the edge is to see all texels that are looked up; lower, a ball
+# of few texels would hide its own
 
 
-def find_seams(scene: Scene, kernel: KernelScene, uvs, cells) -> Seams:
-    """The seams of a lightmap: ``uvs`` float32 (T, 3, 2) of the scene's triangles' corners, in texels, NaN without a
-    place; ``cells`` int32 (H, W) is the receiver that each texel is, -1 for none."""
+def find_seams(scene: Scene, kernel: KernelScene, receivers: Receivers, uvs, cells, poll=lambda: None) -> Seams:
+    """The seams of a lightmap.
+
+    ``uvs`` float32 (T, 3, 2) are those of the scene's triangles' corners, in texels, NaN without a place; ``cells``
+    int32 (H, W) is the receiver that each texel is, -1 for none. ``poll()`` is called between parts of the work; what
+    it raises ends it.
+    """
     triangles, corners = _borders(uvs)
-    lengths = np.linalg.norm(_ahead(uvs, triangles, corners), axis=1)
-    parts = np.cumsum(lengths) // (BLOCK * STEP)
-    seams = [
-        _seams_along(scene, kernel, uvs, cells, triangles[parts == part], corners[parts == part])
-        for part in np.unique(parts)
-    ]
-    return Seams(*(np.concatenate(arrays) for arrays in zip((NO_SEAMS.receivers, NO_SEAMS.shares), *seams)))
+    until = np.cumsum(np.linalg.norm(_ahead(uvs, triangles, corners), axis=1))
+    step = max(STEP, until[-1] / MOST_POINTS) if len(until) else STEP
+    parts = until // (BLOCK * step)
+    seams = [NO_SEAMS]
+    for part in np.unique(parts):
+        poll()
+        edges = triangles[parts == part], corners[parts == part]
+        seams.append(_seams_along(scene, kernel, receivers, uvs, cells, *edges, step))
+    return Seams(*(np.concatenate([getattr(part, name) for part in seams]) for name in ("receivers", "shares")))
 
 
-def _seams_along(scene, kernel, uvs, cells, triangles, corners):
-    """Receivers (M, 8) and shares (M, 8) of points on edges, as Seams has them."""
-    triangles, weights, outwards = _points_along(scene, uvs, triangles, corners)
+def _seams_along(scene, kernel, receivers, uvs, cells, triangles, corners, step) -> Seams:
+    """The seams along edges, with a point in each step."""
+    triangles, weights, outwards = _points_along(scene, uvs, triangles, corners, step)
     others, other_weights, found = _other_sides(scene, kernel, uvs, triangles, weights, outwards)
     triangles, weights = triangles[found], weights[found]
-    normal = surface_receivers(scene, triangles, weights).normals
-    other_normal = surface_receivers(scene, others, other_weights).normals
     here, there = _places(uvs, triangles, weights), _places(uvs, others, other_weights)
-    is_seam = np.einsum("nc,nc->n", normal, other_normal) > SAME_NORMAL
-    is_seam &= ((here - there) ** 2).sum(axis=1) > APART**2
-    receivers, shares = bilinear(cells, here[is_seam])
-    other_receivers, other_shares = bilinear(cells, there[is_seam])
-    return np.hstack([receivers, other_receivers]), np.hstack([shares, -other_shares])
+    points = surface_receivers(scene, triangles, weights)
+    is_seam = np.einsum("nc,nc->n", points.normals, surface_receivers(scene, others, other_weights).normals)
+    is_seam = (is_seam > SAME_NORMAL) & (((here - there) ** 2).sum(axis=1) > APART**2)
+    (texels, shares), (other_texels, other_shares) = bilinear(cells, here[is_seam]), bilinear(cells, there[is_seam])
+    texels, shares = np.hstack([texels, other_texels]), np.hstack([shares, -other_shares])
+    above = SIGHT * np.linalg.norm(outwards, axis=1)[found][is_seam]
+    is_open = _see_all(kernel, points.part(is_seam), receivers, texels, shares, above)
+    return Seams(texels[is_open].astype(np.int32), shares[is_open].astype(np.float32))
+
+
+def _see_all(kernel, points, receivers, texels, shares, above):
+    """Whether each point (N,) sees all receivers (N, 8) that have a share in what is looked up, from so far above
+    (N,) [m]."""
+    is_open = np.ones(len(points), bool)
+    start = points.positions + above[:, None] * points.normals
+    for texel, share in zip(texels.T, shares.T):
+        end = receivers.positions[texel] + above[:, None] * receivers.normals[texel]
+        is_open &= (share == 0) | ~kernel.occluded(start, end)
+    return is_open
 
 
 def _borders(uvs):
@@ -63,8 +85,8 @@ def _borders(uvs):
     edges = starts + np.roll(starts, -1, axis=1)
     edges[starts == np.roll(starts, -1, axis=1)] = 0  # without a length
     order = np.argsort(edges, axis=None)
-    is_new = np.append(True, np.diff(edges.ravel()[order]) != 0)
-    alone = np.sort(order[is_new & np.append(is_new[1:], True)])
+    differs = np.diff(edges.ravel()[order]) != 0
+    alone = np.sort(order[np.append(True, differs) & np.append(differs, True)] if len(order) else order)
     alone = alone[edges.ravel()[alone] != 0]
     return triangles[alone // 3], alone % 3
 
@@ -77,11 +99,11 @@ def _mixed(numbers):
     return mixed ^ (mixed >> np.uint64(31))
 
 
-def _points_along(scene, uvs, triangles, corners):
-    """Points on edges, a texel or so apart over all of them: triangles (N,), barycentrics (N, 3), and a texel's length
+def _points_along(scene, uvs, triangles, corners, step):
+    """Points on edges, so many texels apart over all of them: triangles (N,), barycentrics (N, 3), and a texel's length
     out of the triangle there (N, 3) [m]."""
     ends, lengths = (corners + 1) % 3, np.linalg.norm(_ahead(uvs, triangles, corners), axis=1)
-    until = np.cumsum(lengths) / STEP
+    until = np.cumsum(lengths) / step
     begin = np.append(0.0, until[:-1])
     # one in the middle of every step along all edges end to end: short ones have some together
     first = np.ceil(begin - 0.5).astype(np.int64)
@@ -111,12 +133,14 @@ def _other_sides(scene, kernel, uvs, triangles, weights, outwards):
     others, hits = kernel.closest_hits(there, -normals)
     found = others >= 0
     found &= np.isfinite(uvs).all(axis=(1, 2))[others] & (others != triangles)
-    found &= np.abs(hits[:, 2] - LIFT * texel[:, 0]) < LEVEL * texel[:, 0]
-    found = np.flatnonzero(found)
+    found = np.flatnonzero(found & (hits[:, 2] < DEPTH * texel[:, 0]))
+    height = points[found] - _corners(scene, others[found])[:, 0]
+    height = np.einsum("nc,nc->n", height, _flat_normals(scene, others[found]))
+    found = found[np.abs(height) < LEVEL * texel[found, 0]]
     # what lies on this side of the edge, too, is another layer and not what goes on
     inside = _weights_at(_corners(scene, others[found]), (points - BEYOND * outwards)[found])
     found = found[inside.min(axis=1) < 0]
-    # a wall on the seam parts the light
+    # a wall as thin as nothing
     found = found[~kernel.occluded((above - BEYOND * outwards)[found], there[found])]
     others, hits = others[found], hits[found].astype(np.float64)
     return others, np.stack([1 - hits[:, 0] - hits[:, 1], hits[:, 0], hits[:, 1]], axis=1), found

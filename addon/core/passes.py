@@ -164,8 +164,10 @@ def gather_until(
         if stopped is not None:
             if not is_asked and needs_denoising(found.rms, error):
                 found = _denoised(denoise, job, grid, found, samples, direct, probes)
-            values = grid.stitched(found.values)
+            values = grid.stitched(found.values, lambda: on_step(1.0))
             rms, traced = rms_of(probes.squares_of(values)), (samples.rays, probes.measured.rays)
+            if found.rms <= error < rms:
+                stopped = "as seams were stitched"
             return Gathered(values, rms, stopped, found.is_denoised, *traced)
         del found, scales  # a fine lightmap's are a gigabyte, which the next estimate needs
 

@@ -7,16 +7,17 @@ show the same, by least squares: Iwanicki 2013, "Lighting technology of The Last
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from .emitters import luminance_of
 
-STAY = 0.05  # what a texel's change costs, beside a difference between the sides, both by the light there: with this
-# a fortieth is left of differences; with less, texels swing to and fro along the seam
+STAY = 0.05  # is what a texel's change costs beside a difference between the sides, both by the light there. So a
+# thirtieth of differences is left; were it less, texels would swing to and fro along the seam
 LEAST_LIGHT = 1e-3  # of the median: what is darker is as easily changed
-MOST_STEPS, PRECISE = 100, 1e-4  # of conjugate gradients: these end at so much of what there was to do
+MOST_STEPS, PRECISE = 100, 1e-3  # of conjugate gradients: these end at so much of what there was to do
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +26,8 @@ class Seams:
 
     Attributes
     ----------
-    receivers : int64 (M, 8) four texels of one side and four of the other
-    shares : float64 (M, 8) of them in what is seen, of the other side less than 0: they sum to 0
+    receivers : int32 (M, 8) four texels of one side and four of the other
+    shares : float32 (M, 8) of them in what is seen, of the other side less than 0: they sum to 0
     """
 
     receivers: np.ndarray
@@ -36,33 +37,37 @@ class Seams:
         """What is seen on one side more than on the other, of values (N, C): (M, C)."""
         return np.einsum("mk,mkc->mc", self.shares, values[self.receivers])
 
-    def stitched(self, values):
-        """Irradiance (N, 3) with the least change after which both sides show the same, float32 (N, 3)."""
+    def stitched(self, values, poll: Callable[[], None] = lambda: None):
+        """Irradiance (N, 3) with the least change after which both sides show nearly the same, float32 (N, 3).
+
+        ``poll()`` is called between steps; what it raises ends the work.
+        """
         if not len(self.receivers):
             return values
         texels, unknowns = np.unique(self.receivers, return_inverse=True)
-        unknowns = unknowns.reshape(self.receivers.shape)
-        before = values[texels].astype(np.float64)
-        light = luminance_of(before)
-        least = LEAST_LIGHT * np.median(light[light > 0]) if (light > 0).any() else 1.0
+        unknowns = unknowns.reshape(self.receivers.shape).astype(np.int32)
+        light = luminance_of(values[texels])
+        unit = float(np.median(light[light > 0])) if (light > 0).any() else 1.0
+        before = (values[texels] / np.float64(unit)).astype(np.float32)
+        light = np.maximum(luminance_of(before), LEAST_LIGHT)
         # twice the light may change by the root of two more: by as much, what is dark would hardly, and pull down
-        easy = np.sqrt(np.maximum(light, least))
-        typical = np.sqrt(np.maximum(np.einsum("mk,mk->m", np.abs(self.shares) / 2, light[unknowns]), least))
-        shares = self.shares * easy[unknowns] / typical[:, None]
-        changes = _least_changes(unknowns, shares, self.jumps(values) / typical[:, None], len(texels))
+        easy = np.sqrt(light)
+        typical = np.sqrt(np.einsum("mk,mk->m", np.abs(self.shares) / 2, light[unknowns]))
+        jumps = np.einsum("mk,mkc->mc", self.shares, before[unknowns]) / typical[:, None]
+        changes = _least_changes(unknowns, self.shares * easy[unknowns] / typical[:, None], jumps, len(texels), poll)
         out = values.copy()
-        out[texels] = np.maximum(before + easy[:, None] * changes, 0.0)
+        out[texels] = np.maximum(before + easy[:, None] * changes, 0.0) * np.float64(unit)
         return out
 
 
-NO_SEAMS = Seams(np.zeros((0, 8), np.int64), np.zeros((0, 8)))
+NO_SEAMS = Seams(np.zeros((0, 8), np.int32), np.zeros((0, 8), np.float32))
 
 
-def _least_changes(unknowns, shares, jumps, count):
+def _least_changes(unknowns, shares, jumps, count, poll):
     """Changes x (count, C) that minimise |shares x + jumps|^2 + STAY |x|^2, by conjugate gradients, all channels in
     one: shares (M, 8) of the unknowns (M, 8)."""
     order = np.argsort(unknowns, axis=None, kind="stable")
-    rows = order // unknowns.shape[1]
+    rows = (order // unknowns.shape[1]).astype(np.int32)
     sorted_shares = shares.ravel()[order][:, None]
     starts = np.searchsorted(unknowns.ravel()[order], np.arange(count))
 
@@ -70,20 +75,21 @@ def _least_changes(unknowns, shares, jumps, count):
         return np.add.reduceat(sorted_shares * differences[rows], starts, axis=0)
 
     def product(x):
-        return back(np.einsum("mk,mkc->mc", shares, x[unknowns])) + STAY * x
+        return back(np.einsum("mk,mkc->mc", shares, x[unknowns])) + np.float32(STAY) * x
 
-    diagonal = np.add.reduceat(sorted_shares**2, starts, axis=0) + STAY
-    x, left = np.zeros((count, jumps.shape[1])), -back(jumps)
+    diagonal = np.add.reduceat(sorted_shares**2, starts, axis=0) + np.float32(STAY)
+    x, left = np.zeros((count, jumps.shape[1]), np.float32), -back(jumps)
     ahead = left / diagonal
-    size = first = float((left * ahead).sum())
+    size = first = float((left * ahead).sum(dtype=np.float64))
     for _ in range(MOST_STEPS):
+        poll()
         if size <= PRECISE**2 * first:
             break
         image = product(ahead)
-        length = size / float((ahead * image).sum())
+        length = np.float32(size / float((ahead * image).sum(dtype=np.float64)))
         x += length * ahead
         left -= length * image
         scaled = left / diagonal
-        size, before = float((left * scaled).sum()), size
-        ahead = scaled + size / before * ahead
+        size, before = float((left * scaled).sum(dtype=np.float64)), size
+        ahead = scaled + np.float32(size / before) * ahead
     return x

@@ -70,9 +70,9 @@ class TexelGrid:
         """Values per receiver (N, C) as they are stored: each texel has its own."""
         return receiver_values
 
-    def stitched(self, values):
-        """Irradiance (N, 3) as it is shown: the same on both sides of seams."""
-        return self.seams.stitched(values)
+    def stitched(self, values, poll=lambda: None):
+        """Irradiance (N, 3) as it is shown: the same on both sides of seams; ``poll()`` is called between steps."""
+        return self.seams.stitched(values, poll)
 
     def members(self, chosen):
         """Receivers of chosen values (M,), where each value's start among them (M,), and their shares in it (M,)."""

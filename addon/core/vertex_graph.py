@@ -63,7 +63,7 @@ class VertexGraph:
         """Values per receiver (N, C), each replaced by that of the value it is part of."""
         return self._means(receiver_values)[self.owners]
 
-    def stitched(self, values):
+    def stitched(self, values, poll=None):
         """Irradiance (N, 3) as it is shown: corners of faces that go on have one value as it is."""
         return values
 

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from addon.core import bake as bake_module
 from addon.core.bake import bake
 from addon.core.find_seams import find_seams
+from addon.core.receivers import surface_receivers
 from addon.core.scene import PointLight
 from addon.core.seams import NO_SEAMS, STAY, Seams
 from addon.core.settings import BakeSettings
 from addon.core.texels import texels
 from addon.core.unwrap import unwrap
-from tests.scenes import box, kernel_of, rectangle, scene_of, sphere
+from tests.scenes import Part, box, kernel_of, rectangle, scene_of, sphere
 
 TEXELS = 1 << 14
 
@@ -26,7 +27,8 @@ def laid_out(scene):
     charts = unwrap(scene, BakeSettings(texels=TEXELS))
     texel_map = texels(charts)
     with kernel_of(scene) as kernel:
-        return charts, texel_map, find_seams(scene, kernel, charts.uvs, texel_map.cells)
+        receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
+        return charts, texel_map, find_seams(scene, kernel, receivers, charts.uvs, texel_map.cells)
 
 
 def positions_of(scene, texel_map):
@@ -54,7 +56,7 @@ def test_panels_that_meet_have_a_seam_there_and_nowhere_else():
     # a point a texel from each side, along two metres
     density = np.sqrt(TEXELS / 4)  # of four square metres; gutters take some
     assert len(seams.receivers) == pytest.approx(2 * 2 * density, rel=0.1)
-    assert seams.shares.sum(axis=1) == pytest.approx(0.0, abs=1e-12)
+    assert seams.shares.sum(axis=1) == pytest.approx(0.0, abs=1e-6)
     is_left = places[..., 0] < 1
     assert (is_left[:, :4].all(axis=1) ^ is_left[:, 4:].all(axis=1)).all(), "four texels of one side, four of the other"
 
@@ -86,6 +88,44 @@ def test_a_wall_on_a_seam_parts_it(others, is_parted):
 def test_a_gap_of_a_texel_is_no_seam(gap, is_seam):
     """A texel is 1.6 cm here; a ray looks a twentieth of that beyond the edge."""
     assert (len(laid_out(panels(gap=gap))[2].receivers) > 0) == is_seam
+
+
+def lit_on_one_side(thickness, offset):
+    """A floor of two panels, a partition of so many texels on their seam or beside it, a lamp on the left."""
+    texel = np.sqrt(8 / TEXELS)
+    low = 1 + (offset - thickness / 2) * texel
+    wall = box((low, 0, 0), (low + thickness * texel, 2, 1), name="wall", is_target=False)
+    left = rectangle((-1, 0, 0), (2, 0, 0), (0, 2, 0), name="left")
+    right = rectangle((1, 0, 0), (2, 0, 0), (0, 2, 0), name="right")
+    return scene_of([left, right, wall], [PointLight("lamp", (0.0, 1.0, 1.0), intensity=(1.0, 1.0, 1.0))])
+
+
+@pytest.mark.parametrize(
+    ("thickness", "offset"), [(0.2, 0.0), (0.6, 0.0), (1.3, 0.0), (0.2, 0.4), (6.0, 3.2), (6.0, -3.2)]
+)
+def test_a_partition_takes_no_light_from_the_floor_beside_it(thickness, offset, monkeypatch):
+    """However thick, and on the seam or up to 0.4 texels beside it; light behind it must not come through either."""
+    scene = lit_on_one_side(thickness, offset)
+    settings = BakeSettings(texels=TEXELS, error=0.05)
+    stitched = bake(scene, settings)
+    monkeypatch.setattr(bake_module, "find_seams", lambda *_: NO_SEAMS)
+    plain = bake(scene, settings)
+    before, after = plain.lightmap.pixels[..., 0], stitched.lightmap.pixels[..., 0]
+    is_lit = before > 0.1 * before.max()
+    assert np.abs(after[is_lit] / before[is_lit] - 1).max() < 0.01
+    assert after[~is_lit].max() <= 1.01 * before[~is_lit].max()
+    assert stitched.report.estimated_error < 1.1 * plain.report.estimated_error
+
+
+@pytest.mark.parametrize("segments", [6, 8, 12, 64])
+def test_a_smooth_column_has_its_seam_however_few_its_faces(segments):
+    angle = 2 * np.pi * np.arange(segments + 1) / segments
+    ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(segments + 1)], axis=1)
+    points = np.concatenate([ring, ring + (0, 0, 3)])
+    faces = [(i, i + 1, i + 2 + segments, i + 1 + segments) for i in range(segments)]
+    column = Part(points, faces, name="column", normals=np.concatenate([ring, ring]))
+    # it ends where it begins, along three metres, and may be cut elsewhere, too
+    assert len(laid_out(scene_of([column]))[2].receivers) > 50
 
 
 def test_no_seam_where_a_room_bends():
@@ -135,14 +175,13 @@ def test_stitched_is_the_least_change_by_least_squares():
     wanted = np.vstack([-(rows @ values) / typical[:, None], np.zeros((40, 3))])
     change = np.linalg.lstsq(system, wanted, rcond=None)[0]
     assert (values + change > 0).all(), "nothing to clip"
-    # conjugate gradients end at 1e-4 of what is to do; what is hardest to change, by STAY, has some ten times more left
-    assert np.abs(seams.stitched(values) - values - change).max() < 3e-3 * np.abs(change).max()
+    # conjugate gradients end at a thousandth of what is to do, by a norm in which STAY counts 20 times less than shares
+    assert np.abs(seams.stitched(values) - values - change).max() < 0.02 * np.abs(change).max()
 
 
 def test_light_that_goes_on_stays():
-    """Of a field that is linear in space lookup differs by what the rim's texels are moved inside alone."""
-    scene = panels()
-    _, texel_map, seams = laid_out(scene)
+    """Where both sides are as bright there is nothing to change, but for rounding."""
+    _, texel_map, seams = laid_out(panels())
     light = np.full((len(texel_map), 3), 2.0, np.float32)
     assert np.abs(seams.stitched(light) - light).max() < 1e-6
 
@@ -159,7 +198,7 @@ def test_any_light_is_stitched_alike(seed, scale):
     elsewhere = np.setdiff1d(np.arange(100), seams.receivers)
     assert (stitched[elsewhere] == values[elsewhere]).all()
     scaled = seams.stitched((values * np.float32(scale)).astype(np.float32))
-    assert scaled == pytest.approx(scale * stitched, rel=1e-4, abs=1e-6 * scale * float(values.max()))
+    assert scaled == pytest.approx(scale * stitched, rel=1e-3, abs=1e-5 * scale * float(values.max()))
 
 
 def test_darkness_is_stitched_to_darkness():
