@@ -83,7 +83,7 @@ def parser() -> argparse.ArgumentParser:
         type=int,
         default=0,
         metavar="N",
-        help="trace so many bounces of sharp rays from mirrors and through glass; 0 = the bake alone (default)",
+        help="trace so many bounces of sharp rays from mirrors, and glass; 0 = the bake alone (default)",
     )
     picture.set_defaults(run=run_picture)
     _add_verify(commands)

@@ -23,7 +23,8 @@ from .write_lightmap import IMAGE_PROPERTY, set_lightmap_uvs
 
 SEEN_BY = ("visible_camera", "visible_glossy", "visible_transmission")
 LONGER_SIDE = 960  # pixels
-MOST_BOUNCES = 1024
+MOST_BOUNCES = 512
+THROUGH = 16  # surfaces of glass, two of a pane
 MIDDLE_GREY = 0.20  # radiance that the median of the picture is exposed to: dark corners open, sun patches keep shape
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -45,10 +46,11 @@ def render(path_png, width=960, height=540, samples=16, view_transform="AgX", ex
     Parameters
     ----------
     samples : rays per pixel; they only smooth edges, as nothing here is random but the place within the pixel, and
-        whether a ray that meets glass is reflected
+        which way a ray goes on that has two
     view_transform : of Blender's colour management, e.g. "AgX", "Standard", "Raw"
     exposure : stops; None = chosen so that the median of the picture becomes a middle grey
-    bounces : of rays from mirrors and through glass; 0 = all surfaces as the bake lights them, glass without refraction
+    bounces : of rays from mirrors, and through surfaces of glass so many and THROUGH more; 0 = all surfaces as the bake
+        lights them, glass without refraction
 
     PictureError where the scene has no camera or nothing that is baked.
     """
@@ -59,6 +61,7 @@ def render(path_png, width=960, height=540, samples=16, view_transform="AgX", ex
         raise PictureError(f"scene {source.name} has no camera")
     copy = _SceneCopy(source, bounces > 0)
     try:
+        copy.fill()
         scene = copy.scene
         if not copy.is_baked:
             raise PictureError(f"scene {source.name} has nothing to show: no object that is rendered has a bake")
@@ -83,6 +86,9 @@ class _SceneCopy:
         self.scene.camera = source.camera
         self.scene.world = source.world
         self.scene.collection.objects.link(source.camera)
+
+    def fill(self):
+        """Copy everything that a render shows."""
         with as_rendered(bpy.context.scene, bpy.context.view_layer):
             meshes = self._evaluated_meshes()
         for shown in meshes:
@@ -133,6 +139,8 @@ def _light_of(obj, mesh):
     """Where the object's baked light is; its place in a shared atlas goes into the mesh copy's UVs."""
     image = obj.get(IMAGE_PROPERTY)
     layer = mesh.uv_layers.get(LIGHTMAP_LAYER)
+    if image is not None and not isinstance(image, bpy.types.Image):
+        raise PictureError(f"object {obj.name}: its property {IMAGE_PROPERTY} is no image")
     if image is not None and layer is not None:
         uvs = np.empty(len(mesh.loops) * 2, np.float32)
         layer.uv.foreach_get("vector", uvs)
@@ -144,11 +152,15 @@ def _light_of(obj, mesh):
 
 
 def _set_up(scene, view_transform, bounces):
-    scene.render.engine = "CYCLES"
+    try:
+        scene.render.engine = "CYCLES"
+    except TypeError as error:
+        raise PictureError("pictures need Blender's add-on Cycles Render Engine, which is off") from error
     cycles = scene.cycles
     cycles.device = "CPU"
     # after its last bounce a ray still sees what shines, which is all that there is to see
-    cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = max(bounces - 1, 0)
+    cycles.glossy_bounces = max(bounces - 1, 0)
+    cycles.max_bounces = cycles.transmission_bounces = bounces - 1 + THROUGH if bounces else 0
     cycles.diffuse_bounces = cycles.volume_bounces = 0
     cycles.sample_clamp_indirect = 0.0
     cycles.transparent_max_bounces = 32

@@ -9,10 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
-from .picture_rays import GLASS, feed, make_sharp, traced_glass, traced_glossy, traced_principled
+from .picture_rays import GLASS, chosen, feed, make_sharp, traced_glass, traced_glossy, traced_principled
 from .read_materials import DIFFUSE, GLOSSY, PASSING, TRANSLUCENT, VELVET
 from .read_mesh import LIGHTMAP_LAYER
+from .shader_nodes import Unreadable, conductor_colour
 
 MIRRORS = {"BSDF_GLOSSY", "BSDF_METALLIC"}
 LIT = DIFFUSE | VELVET | GLOSSY | TRANSLUCENT  # shaders that the stored light is seen by, and their colours' names
@@ -36,7 +38,7 @@ class LitMaterials:
     def __init__(self, is_traced: bool):
         self._is_traced = is_traced
         self._made = {}
-        self._groups = []
+        self._copies, self._groups = [], []
 
     def lit(self, material, light: Light):
         """The material (or None) as it looks under a light."""
@@ -46,17 +48,19 @@ class LitMaterials:
         return self._made[key]
 
     def remove(self):
-        for made in self._made.values():
-            bpy.data.materials.remove(made)
+        for copy in self._copies:
+            bpy.data.materials.remove(copy)
         for group in self._groups:
             bpy.data.node_groups.remove(group)
-        self._made, self._groups = {}, []
+        self._made, self._copies, self._groups = {}, [], []
 
     def _build(self, material, light):
         if material is None or not material.use_nodes:
             colour = (0.8, 0.8, 0.8) if material is None else material.diffuse_color[:3]
-            return _plain(colour, light)
+            self._copies.append(_plain(colour, light))
+            return self._copies[-1]
         copy = material.copy()
+        self._copies.append(copy)
         self._convert(copy.node_tree, light)
         return copy
 
@@ -69,6 +73,7 @@ class LitMaterials:
             elif node.type == "BSDF_PRINCIPLED":
                 _replace(tree, node, _principled(tree, node, light, self._is_traced))
             elif node.type in LIT:
+                _make_coloured(node)
                 colour = node.inputs[LIT[node.type]]
                 lit = _reflected(tree, colour, light)
                 if self._is_traced and node.type in MIRRORS:
@@ -92,6 +97,17 @@ def _plain(colour, light):
     return made
 
 
+def _make_coloured(node):
+    """Give a metal that has indices the colour that they make."""
+    try:
+        colour = conductor_colour(node)
+    except Unreadable:
+        colour = (0.5, 0.5, 0.5)
+    if colour is not None:
+        node.fresnel_type = "F82"
+        node.inputs["Base Color"].default_value = (*np.minimum(colour, 1.0), 1.0)
+
+
 def _replace(tree, node, shader):
     """Let everything that ``node`` feeds be fed by ``shader``."""
     for link in list(node.outputs[0].links):
@@ -101,13 +117,16 @@ def _replace(tree, node, shader):
 
 def _principled(tree, node, light, is_traced):
     base = node.inputs["Base Color"]
+
+    def solid():
+        lit = _reflected(tree, base, light)
+        return traced_principled(tree, node, lit) if is_traced else lit
+
+    def clear():
+        return traced_glass(tree, node) if is_traced else _transparent(tree, base)
+
     # the reader of materials draws the same line: light passes from a transmission of 0.5 on
-    if node.inputs["Transmission Weight"].default_value >= 0.5:
-        reflected = traced_glass(tree, node) if is_traced else _transparent(tree, base)
-    else:
-        reflected = _reflected(tree, base, light)
-        if is_traced:
-            reflected = traced_principled(tree, node, reflected)
+    reflected = chosen(tree, node.inputs["Transmission Weight"], solid, clear)
     emitted = tree.nodes.new("ShaderNodeEmission")
     feed(tree, node.inputs["Emission Color"], emitted.inputs["Color"])
     feed(tree, node.inputs["Emission Strength"], emitted.inputs["Strength"])

@@ -17,7 +17,16 @@ from .private_render import ON_DIFFUSE_SURFACES
 from .read_images import RIM, mean_colour
 from .read_mesh import BAKED_COLOURS
 from .render_colours import ShaderInput, feeding
-from .shader_nodes import Reached, Unreadable, constant, constant_colour, follow, output_input, surface_shader
+from .shader_nodes import (
+    Reached,
+    Unreadable,
+    conductor_colour,
+    constant,
+    constant_colour,
+    follow,
+    output_input,
+    surface_shader,
+)
 from .surfaces import Colour, Surface, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates
 from .two_sides import as_shadow_rays_see, two_sided
@@ -181,6 +190,9 @@ class MaterialReading:
             return Surface(colour.scaled(np.interp(self._amount(reached, "Roughness").mean[0], *SHEEN)))
         if kind in GLOSSY:
             self.say(f"its {reached.node.bl_label} is baked as diffuse")
+            metal = conductor_colour(reached.node)
+            if metal is not None:
+                return Surface(Colour(metal).within(1.0))
             return Surface(self._colour(reached, GLOSSY[kind]).within(1.0))
         if kind in PASSING:
             return Surface(transmittance=self._colour(reached, "Color").within(1.0))

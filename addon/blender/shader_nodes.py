@@ -38,7 +38,7 @@ class Reached:
 def follow(socket, groups=()) -> Reached:
     """Walk from an input back to the node that feeds it."""
     while True:
-        link = _live_link(socket)
+        link = live_link(socket)
         if link is None:
             return Reached(socket, None, groups)
         node = link.from_node
@@ -89,6 +89,19 @@ def _constant_value(reached):
     raise Unreadable(f"{reached.node.bl_label} node")
 
 
+def conductor_colour(node) -> np.ndarray | None:
+    """What a Metallic ``node`` that has indices instead of a colour reflects head-on (3,); None of one with a colour.
+
+    Born & Wolf, 14.2 (32): ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2).
+    """
+    if getattr(node, "fresnel_type", "F82") != "PHYSICAL_CONDUCTOR":
+        return None
+    if any(live_link(node.inputs[name]) for name in ("IOR", "Extinction")):
+        raise Unreadable(f"{node.bl_label} node whose indices are linked")
+    n, k = (np.array(node.inputs[name].default_value) for name in ("IOR", "Extinction"))
+    return ((n - 1) ** 2 + k**2) / ((n + 1) ** 2 + k**2)
+
+
 def constant_vector(mapping: Reached, name) -> tuple[float, float, float]:
     """An input of a Mapping node that does not vary."""
     if name not in mapping.node.inputs:  # a Vector mapping has no location
@@ -99,7 +112,8 @@ def constant_vector(mapping: Reached, name) -> tuple[float, float, float]:
     return tuple(reached.socket.default_value)
 
 
-def _live_link(socket):
+def live_link(socket):
+    """The link that feeds an input, None where none does."""
     return next((link for link in socket.links if link.is_valid and not link.is_muted), None)
 
 

@@ -1,7 +1,7 @@
 """Find the seams of a lightmap: rays look for what lies beyond the borders of its charts.
 
-So that charts, objects and T-junctions are one, and what lies beside the surface or under it is not what goes on. Nor is
-there a seam where a wall stands on it or beside it: what is looked up there is light of both sides of the wall.
+So that charts, objects and T-junctions are one, and what lies beside the surface or under it is not what goes on. Nor
+is there a seam where a wall stands on it or beside it: what is looked up there is light of both sides of the wall.
 """
 
 from __future__ import annotations

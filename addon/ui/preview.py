@@ -21,7 +21,7 @@ class PATCHLIGHT_OT_preview(bpy.types.Operator):
 
     bounces: IntProperty(
         name="Bounces",
-        description="Of rays from mirrors and through glass; 0 shows all surfaces as the bake lights them",
+        description="Of rays from mirrors; 0 shows all surfaces as the bake lights them, and glass without refraction",
         default=4,
         min=0,
         max=picture.MOST_BOUNCES,
@@ -36,14 +36,18 @@ class PATCHLIGHT_OT_preview(bpy.types.Operator):
         if context.mode != "OBJECT":
             cls.poll_message_set("Switch to Object Mode first")
             return False
+        if bpy.app.is_job_running("RENDER"):
+            cls.poll_message_set("A render is running")
+            return False
         if context.scene.camera is None:
             cls.poll_message_set("The scene has no camera")
             return False
         return True
 
     def execute(self, context):
-        """Render and show; nothing but the image stays in the file, and as nothing uses it, it is not saved."""
+        """Render and show; nothing but the image stays in the file, for as long as an Image Editor shows it."""
         path = Path(bpy.app.tempdir) / "patchlight_preview.png"
+        path.unlink(missing_ok=True)
         if context.window:
             context.window.cursor_set("WAIT")
         try:
@@ -54,17 +58,21 @@ class PATCHLIGHT_OT_preview(bpy.types.Operator):
         finally:
             if context.window:
                 context.window.cursor_set("DEFAULT")
+        if not path.exists():
+            self.report({"ERROR"}, "Blender rendered nothing")
+            return {"CANCELLED"}
         _show(context.window_manager, _image(path))
         return {"FINISHED"}
 
 
 def _image(path):
-    image = bpy.data.images.get(IMAGE_NAME)
-    if image is None:
-        image = bpy.data.images.load(str(path))
-        image.name = IMAGE_NAME
-    image.filepath = str(path)
-    image.reload()
+    """The file as an image, packed, as it is gone with this Blender; in the place of an older one."""
+    image, older = bpy.data.images.load(str(path)), bpy.data.images.get(IMAGE_NAME)
+    image.pack()
+    if older is not None:
+        older.user_remap(image)
+        bpy.data.images.remove(older)
+    image.name = IMAGE_NAME
     return image
 
 
@@ -77,7 +85,8 @@ def _show(manager, image):
 
 
 def _editors(manager):
-    return [area for window in manager.windows for area in window.screen.areas if area.type == "IMAGE_EDITOR"]
+    """Image Editors that are no UV Editors."""
+    return [area for window in manager.windows for area in window.screen.areas if area.ui_type == "IMAGE_EDITOR"]
 
 
 CLASSES = (PATCHLIGHT_OT_preview,)

@@ -309,6 +309,20 @@ def test_a_glossy_shader_is_baked_as_diffuse_and_said_so(nodes, read_material):
     assert "'Chrome'" in warnings[0]
 
 
+def test_a_metal_of_indices_is_baked_with_the_colour_that_they_make(nodes, read_material):
+    """Its Base Color is out of reach then, and asking for it raised."""
+    material, tree = nodes()
+    metal = tree.new("BsdfMetallic")
+    metal.fresnel_type = "PHYSICAL_CONDUCTOR"
+    metal.inputs["IOR"].default_value, metal.inputs["Extinction"].default_value = (0.5, 1.0, 2.0), (2.0, 1.0, 0.0)
+    tree.show(metal)
+    found, warnings = read_material(material)
+    # ((n - 1)^2 + k^2) / ((n + 1)^2 + k^2)
+    assert found.reflectance == pytest.approx([4.25 / 6.25, 1 / 5, 1 / 9], rel=1e-6)
+    assert len(warnings) == 1
+    assert "Metallic BSDF is baked as diffuse" in warnings[0]
+
+
 def test_a_volume_alone_lets_all_light_pass_and_is_not_baked(nodes, add_cube):
     material, tree = nodes("fog")
     tree.tree.links.new(tree.new("VolumeScatter").outputs[0], tree.new("OutputMaterial").inputs["Volume"])

@@ -226,6 +226,7 @@ def test_a_preview_shows_the_bake_and_is_not_saved(room):
         assert bpy.ops.patchlight.preview(bounces=bounces) == {"FINISHED"}
         image = bpy.data.images["Patchlight Preview"]
         assert (max(image.size), image.users) == (picture.LONGER_SIDE, 0)
+        assert image.packed_file is not None, "an Image Editor that shows it saves it"
         assert max(image.pixels[:4000]) > 0
     assert len(bpy.data.objects) == objects
     assert [image.name for image in bpy.data.images].count("Patchlight Preview") == 1

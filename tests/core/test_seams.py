@@ -121,7 +121,7 @@ def test_a_partition_takes_no_light_from_the_floor_beside_it(thickness, offset, 
 def test_a_smooth_column_has_its_seam_however_few_its_faces(segments):
     angle = 2 * np.pi * np.arange(segments + 1) / segments
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(segments + 1)], axis=1)
-    points = np.concatenate([ring, ring + (0, 0, 3)])
+    points = np.concatenate([ring, ring + np.array([0, 0, 3])])
     faces = [(i, i + 1, i + 2 + segments, i + 1 + segments) for i in range(segments)]
     column = Part(points, faces, name="column", normals=np.concatenate([ring, ring]))
     # it ends where it begins, along three metres, and may be cut elsewhere, too
