@@ -76,18 +76,19 @@ def _see_all(kernel, points, receivers, texels, shares, above):
 def _borders(uvs):
     """Edges that only one triangle has in the lightmap: triangles (E,), and the corners (E,) that they start from."""
     triangles = np.flatnonzero(np.isfinite(uvs).all(axis=(1, 2)))
-    starts = np.empty((len(triangles), 3), np.uint64)
+    edges = np.empty((len(triangles), 3), np.uint64)
     for first in range(0, len(triangles), BLOCK):
         block = slice(first, first + BLOCK)
         places = np.round(uvs[triangles[block]].astype(np.float64) / SAME_UV).astype(np.int64)
-        starts[block] = _mixed((places[..., 0] << 32) + places[..., 1])
-    # of both ends, whichever comes first; one in 10^6 bakes of 10^7 edges takes two for one and leaves a point out
-    edges = starts + np.roll(starts, -1, axis=1)
-    edges[starts == np.roll(starts, -1, axis=1)] = 0  # without a length
-    order = np.argsort(edges, axis=None)
-    differs = np.diff(edges.ravel()[order]) != 0
+        starts = _mixed((places[..., 0] << 32) + places[..., 1])
+        ends = np.roll(starts, -1, axis=1)
+        # of both, whichever comes first; one in 10^6 bakes of 10^7 edges takes two for one and leaves a point out
+        edges[block] = np.where(starts == ends, 0, starts + ends)
+    edges = edges.ravel()
+    order = np.argsort(edges)
+    differs = np.diff(edges[order]) != 0
     alone = np.sort(order[np.append(True, differs) & np.append(differs, True)] if len(order) else order)
-    alone = alone[edges.ravel()[alone] != 0]
+    alone = alone[edges[alone] != 0]  # those without a length
     return triangles[alone // 3], alone % 3
 
 
