@@ -21,7 +21,7 @@ from .rects import in_lightmap, rect_of
 from .visibility import Visibility
 from .write_lightmap import IMAGE_PROPERTY, set_lightmap_uvs
 
-SEEN_BY = ("visible_camera", "visible_glossy", "visible_transmission")
+COPIED = ("color", "pass_index", "visible_camera", "visible_glossy", "visible_transmission")  # that materials see
 LONGER_SIDE = 960  # pixels
 MOST_BOUNCES = 512
 THROUGH = 16  # surfaces of glass, two of a pane
@@ -49,8 +49,8 @@ def render(path_png, width=960, height=540, samples=16, view_transform="AgX", ex
         which way a ray goes on that has two
     view_transform : of Blender's colour management, e.g. "AgX", "Standard", "Raw"
     exposure : stops; None = chosen so that the median of the picture becomes a middle grey
-    bounces : of rays from mirrors, and through surfaces of glass so many and THROUGH more; 0 = all surfaces as the bake
-        lights them, glass without refraction
+    bounces : reflections by mirrors or within glass, of which the last shows glass black; rays pass through as many
+        surfaces of glass and THROUGH more. 0 = all surfaces as the bake lights them, glass without refraction
 
     PictureError where the scene has no camera or nothing that is baked.
     """
@@ -80,12 +80,14 @@ class _SceneCopy:
     def __init__(self, source, is_traced):
         self._materials = LitMaterials(is_traced)
         self._meshes = []
-        self._objects = []
+        self._root = bpy.data.objects.new("picture", None)
+        self._objects = [self._root]
         self.is_baked = False
         self.scene = bpy.data.scenes.new(f"{source.name} picture")
         self.scene.camera = source.camera
         self.scene.world = source.world
         self.scene.collection.objects.link(source.camera)
+        self.scene.collection.objects.link(self._root)
 
     def fill(self):
         """Copy everything that a render shows."""
@@ -119,9 +121,13 @@ class _SceneCopy:
             else:
                 mesh.materials.append(lit)
         obj = bpy.data.objects.new(original.name, mesh)
-        obj.matrix_world = matrix
-        for kind in SEEN_BY:
+        # no object of its own can be sheared, a child's place can
+        obj.parent, obj.matrix_parent_inverse = self._root, matrix
+        for kind in COPIED:
             setattr(obj, kind, getattr(original, kind))
+        for key in original.keys():
+            if isinstance(original[key], float | int | str) or hasattr(original[key], "typecode"):
+                obj[key] = original[key]
         self.scene.collection.objects.link(obj)
         self._objects.append(obj)
 

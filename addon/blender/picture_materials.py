@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .picture_rays import GLASS, chosen, feed, make_sharp, traced_glass, traced_glossy, traced_principled
+from .picture_rays import GLASS, chosen, dimmed, feed, make_sharp, traced_glass, traced_glossy, traced_principled
 from .read_materials import DIFFUSE, GLOSSY, PASSING, TRANSLUCENT, VELVET
 from .read_mesh import LIGHTMAP_LAYER
 from .shader_nodes import Unreadable, conductor_colour
@@ -66,6 +66,8 @@ class LitMaterials:
 
     def _convert(self, tree, light):
         for node in list(tree.nodes):
+            if node.mute:
+                continue
             if node.type == "GROUP" and node.node_tree is not None:
                 node.node_tree = node.node_tree.copy()
                 self._groups.append(node.node_tree)
@@ -105,13 +107,15 @@ def _make_coloured(node):
         colour = (0.5, 0.5, 0.5)
     if colour is not None:
         node.fresnel_type = "F82"
+        for link in list(node.inputs["Base Color"].links):  # a hidden input keeps what was linked to it
+            node.id_data.links.remove(link)
         node.inputs["Base Color"].default_value = (*np.minimum(colour, 1.0), 1.0)
 
 
 def _replace(tree, node, shader):
     """Let everything that ``node`` feeds be fed by ``shader``."""
-    for link in list(node.outputs[0].links):
-        tree.links.new(shader, link.to_socket)
+    for target, is_muted in [(link.to_socket, link.is_muted) for link in node.outputs[0].links]:
+        tree.links.new(shader, target).is_muted = is_muted
     tree.nodes.remove(node)
 
 
@@ -119,7 +123,7 @@ def _principled(tree, node, light, is_traced):
     base = node.inputs["Base Color"]
 
     def solid():
-        lit = _reflected(tree, base, light)
+        lit = dimmed(tree, _reflected(tree, base, light), node.inputs["Transmission Weight"])
         return traced_principled(tree, node, lit) if is_traced else lit
 
     def clear():

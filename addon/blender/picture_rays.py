@@ -1,7 +1,7 @@
 """What smooth surfaces reflect and let through, as Whitted traced it (1980): sharp rays, weighted by Fresnel's law.
 
 Shader nodes for a picture's private materials, over what the bake shows. Nothing is blurred: as a surface gets rougher
-its mirror fades into what the bake shows there, and from ``ROUGH`` on nothing of it is left.
+its mirror fades into what the bake shows there, and from ``ROUGH`` on nothing of it is left. Glass is always clear.
 """
 
 from __future__ import annotations
@@ -43,12 +43,20 @@ def chosen(tree, share, otherwise, shader):
 
 
 def traced_glass(tree, node):
-    """The shader of a Principled ``node`` that transmits."""
-    glass = tree.nodes.new("ShaderNodeBsdfGlass")
-    for name, own in (("Base Color", "Color"), ("IOR", "IOR"), ("Normal", "Normal")):
-        feed(tree, node.inputs[name], glass.inputs[own])
-    make_sharp(tree, glass)
-    return glass.outputs[0]
+    """The shader of a Principled ``node`` that transmits: its colour is of what passes, not of what is reflected."""
+    inside, fresnel = tree.nodes.new("ShaderNodeBsdfRefraction"), tree.nodes.new("ShaderNodeFresnel")
+    feed(tree, node.inputs["Base Color"], inside.inputs["Color"])
+    for shader in (inside, fresnel):
+        feed(tree, node.inputs["IOR"], shader.inputs["IOR"])
+        feed(tree, node.inputs["Normal"], shader.inputs["Normal"])
+    make_sharp(tree, inside)
+    return _mixed(tree, fresnel.outputs[0], inside.outputs[0], node, None, "Normal")
+
+
+def dimmed(tree, emission, share):
+    """The socket of an Emission node, less by ``share``, an input."""
+    _set(tree, _rest(tree, _source(share)), emission.node.inputs["Strength"])
+    return emission
 
 
 def make_sharp(tree, node):

@@ -54,17 +54,16 @@ def translucent_backs(
     return Backs(chosen, shares.astype(np.float32), _behind(scene, before), grid)
 
 
-def with_backs(front: Irradiance, backs: Backs, grid, kernel, solved, error, seed, seconds_left, on_step) -> Irradiance:
+def with_backs(front: Irradiance, backs: Backs, kernel, solved, error, seed, seconds_left, on_step) -> Irradiance:
     """The irradiance of the fronts, where they are translucent mixed with that of the backs as they show it:
-    (rho E_front + tau E_back) / (rho + tau). The error that is seen stays that of the fronts, whose
-    ``grid`` has the seams.
+    (rho E_front + tau E_back) / (rho + tau). The error that is seen stays that of the fronts, and
+    of seams theirs alone are stitched: what an opaque surface has no part in begins there.
     """
     behind = gather_irradiance(
         kernel, solved, backs.receivers, backs.grid, None, error, seed, None, seconds_left, on_step
     )
     values = front.values.copy()
     values[backs.chosen] += backs.shares * (behind.values - values[backs.chosen])
-    values = grid.stitched(values)
     return replace(
         front,
         values=values,

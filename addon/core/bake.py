@@ -95,7 +95,7 @@ def bake(
         )  # fmt: skip
         if backs is not None:
             how = settings.error, settings.seed, seconds_left, lambda done: progress.poll()
-            irradiance = with_backs(irradiance, backs, grid, kernel, solved, *how)
+            irradiance = with_backs(irradiance, backs, kernel, solved, *how)
 
         progress.begin("texels")
         lightmap = corner_colours = None

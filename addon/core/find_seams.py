@@ -23,8 +23,10 @@ DEPTH = 0.3  # no farther down,
 LEVEL = 0.02  # whose plane the edge is off by no more
 SAME_NORMAL = np.cos(np.radians(1.5))  # of shading, of both sides
 APART = 0.5  # texels; what is looked up nearer to each other has no seam
-SIGHT = 0.5  # texels above the surface, from where the edge is to see all texels that are looked up; lower, a ball
-# of few texels would hide its own
+SIGHTS = (0.5, 1.5)  # texels above the surface, from where the edge is to see all texels that are looked up; from lower
+# a ball of few texels would hide its own: what lies flat is met on the way up, by each from
+LYING = 0.02  # times the first of these
+NEAR = 3.0  # texels away is what is looked up; where charts touch, others' texels are
 
 
 def find_seams(scene: Scene, kernel: KernelScene, receivers: Receivers, uvs, cells, poll=lambda: None) -> Seams:
@@ -57,20 +59,33 @@ def _seams_along(scene, kernel, receivers, uvs, cells, triangles, corners, step)
     is_seam = (is_seam > SAME_NORMAL) & (((here - there) ** 2).sum(axis=1) > APART**2)
     (texels, shares), (other_texels, other_shares) = bilinear(cells, here[is_seam]), bilinear(cells, there[is_seam])
     texels, shares = np.hstack([texels, other_texels]), np.hstack([shares, -other_shares])
-    above = SIGHT * np.linalg.norm(outwards, axis=1)[found][is_seam]
-    is_open = _see_all(kernel, points.part(is_seam), receivers, texels, shares, above)
+    texel_sizes = np.linalg.norm(outwards, axis=1)[found][is_seam]
+    is_open = _see_all(kernel, points.part(is_seam), receivers, texels, shares, texel_sizes)
     return Seams(texels[is_open].astype(np.int32), shares[is_open].astype(np.float32))
 
 
-def _see_all(kernel, points, receivers, texels, shares, above):
-    """Whether each point (N,) sees all receivers (N, 8) that have a share in what is looked up, from so far above
-    (N,) [m]."""
-    is_open = np.ones(len(points), bool)
-    start = points.positions + above[:, None] * points.normals
+def _see_all(kernel, points, receivers, texels, shares, sizes):
+    """Whether each point (N,) sees all receivers (N, 8) that have a share in what is looked up, in texels that are so
+    large (N,) [m], over what stands or lies there and below what hangs over it."""
+    is_open = _is_free(kernel, points, sizes)
     for texel, share in zip(texels.T, shares.T):
-        end = receivers.positions[texel] + above[:, None] * receivers.normals[texel]
-        is_open &= (share == 0) | ~kernel.occluded(start, end)
+        looked_up = receivers.part(texel)
+        is_near = np.linalg.norm(looked_up.positions - points.positions, axis=1) < NEAR * sizes
+        sees = is_near & _is_free(kernel, looked_up, sizes)
+        for sight in SIGHTS:
+            sees &= ~kernel.occluded(_above(points, sight * sizes), _above(looked_up, sight * sizes))
+        is_open &= (share == 0) | sees
     return is_open
+
+
+def _is_free(kernel, points, sizes):
+    """Whether nothing lies on points (N,)."""
+    lowest = SIGHTS[0] * sizes
+    return ~kernel.occluded(_above(points, LYING * lowest), _above(points, lowest))
+
+
+def _above(points, heights):
+    return points.positions + heights[:, None] * points.normals
 
 
 def _borders(uvs):

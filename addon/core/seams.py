@@ -16,6 +16,7 @@ from .emitters import luminance_of
 
 STAY = 0.05  # is what a texel's change costs beside a difference between the sides, both by the light there. So a
 # thirtieth of differences is left; were it less, texels would swing to and fro along the seam
+UNLIKE = 3.0  # times as much light on one side is no noise: a shadow ends there, and light that is right would go
 LEAST_LIGHT = 1e-3  # of the median: what is darker is as easily changed
 MOST_STEPS, PRECISE = 100, 1e-3  # of conjugate gradients: these end at so much of what there was to do
 
@@ -37,24 +38,32 @@ class Seams:
         """What is seen on one side more than on the other, of values (N, C): (M, C)."""
         return np.einsum("mk,mkc->mc", self.shares, values[self.receivers])
 
+    def _alike(self, values):
+        """The receivers and shares of those points whose two sides show about as much of values (N, 3)."""
+        seen = self.shares * luminance_of(values[self.receivers])
+        here, there = seen[:, :4].sum(axis=1), -seen[:, 4:].sum(axis=1)
+        is_alike = (here <= UNLIKE * there) & (there <= UNLIKE * here)
+        return self.receivers[is_alike], self.shares[is_alike]
+
     def stitched(self, values, poll: Callable[[], None] = lambda: None):
         """Irradiance (N, 3) with the least change after which both sides show nearly the same, float32 (N, 3).
 
         ``poll()`` is called between steps; what it raises ends the work.
         """
-        if not len(self.receivers):
+        receivers, shares = self._alike(values)
+        if not len(receivers):
             return values
-        texels, unknowns = np.unique(self.receivers, return_inverse=True)
-        unknowns = unknowns.reshape(self.receivers.shape).astype(np.int32)
+        texels, unknowns = np.unique(receivers, return_inverse=True)
+        unknowns = unknowns.reshape(receivers.shape).astype(np.int32)
         light = luminance_of(values[texels])
         unit = float(np.median(light[light > 0])) if (light > 0).any() else 1.0
         before = (values[texels] / np.float64(unit)).astype(np.float32)
         light = np.maximum(luminance_of(before), LEAST_LIGHT)
         # twice the light may change by the root of two more: by as much, what is dark would hardly, and pull down
         easy = np.sqrt(light)
-        typical = np.sqrt(np.einsum("mk,mk->m", np.abs(self.shares) / 2, light[unknowns]))
-        jumps = np.einsum("mk,mkc->mc", self.shares, before[unknowns]) / typical[:, None]
-        changes = _least_changes(unknowns, self.shares * easy[unknowns] / typical[:, None], jumps, len(texels), poll)
+        typical = np.sqrt(np.einsum("mk,mk->m", np.abs(shares) / 2, light[unknowns]))
+        jumps = np.einsum("mk,mkc->mc", shares, before[unknowns]) / typical[:, None]
+        changes = _least_changes(unknowns, shares * easy[unknowns] / typical[:, None], jumps, len(texels), poll)
         out = values.copy()
         out[texels] = np.maximum(before + easy[:, None] * changes, 0.0) * np.float64(unit)
         return out

@@ -142,6 +142,63 @@ def test_a_transmission_that_is_linked_makes_glass(facing, tmp_path):
     assert _seen(tmp_path, samples=64) == pytest.approx(0.8 * LIGHT / 9, abs=PNG_LEVELS + 0.003)
 
 
+def test_clear_glass_of_a_colour_reflects_white(facing, tmp_path):
+    material = _principled(roughness=0.0, ior=2.0, transmission_weight=1.0)
+    material.node_tree.nodes["Principled BSDF"].inputs["Base Color"].default_value = (0, 0, 0, 1)
+    _wear(facing, material)
+    assert _seen(tmp_path, scale=4, samples=256) == pytest.approx(0.8 * LIGHT / 9, abs=PNG_LEVELS / 4 + 0.003)
+
+
+@pytest.mark.parametrize("bounces", [0, 2])
+def test_a_transmission_below_a_half_takes_its_share_of_the_light(facing, tmp_path, bounces):
+    facing.data.color_attributes["Patchlight"].data.foreach_set("color", np.full(16, 0.5, np.float32))
+    _wear(facing, _principled(roughness=1.0, transmission_weight=0.4))
+    assert _seen(tmp_path, bounces=bounces) == pytest.approx(0.6 * 0.5, abs=PNG_LEVELS)
+
+
+def test_a_muted_link_and_a_muted_node_show_nothing(facing, tmp_path):
+    facing.data.color_attributes["Patchlight"].data.foreach_set("color", np.full(16, 0.5, np.float32))
+    material = _principled(roughness=1.0)
+    material.node_tree.links[0].is_muted = True
+    _wear(facing, material)
+    assert _seen(tmp_path, bounces=0) <= PNG_LEVELS
+
+
+def test_a_material_sees_what_its_object_has(facing, tmp_path):
+    """Its colour and its properties, as Object Info and Attribute nodes read them."""
+    facing.data.color_attributes["Patchlight"].data.foreach_set("color", np.full(16, 1.0, np.float32))
+    facing.color, facing["share"] = (0.5, 0.5, 0.5, 1.0), 0.5
+    material = _principled(roughness=1.0)
+    tree = material.node_tree
+    info, attribute = tree.nodes.new("ShaderNodeObjectInfo"), tree.nodes.new("ShaderNodeAttribute")
+    attribute.attribute_type, attribute.attribute_name = "OBJECT", "share"
+    product = tree.nodes.new("ShaderNodeVectorMath")
+    product.operation = "MULTIPLY"
+    tree.links.new(info.outputs["Color"], product.inputs[0])
+    tree.links.new(attribute.outputs["Fac"], product.inputs[1])
+    tree.links.new(product.outputs[0], tree.nodes["Principled BSDF"].inputs["Base Color"])
+    _wear(facing, material)
+    assert _seen(tmp_path, bounces=0) == pytest.approx(0.25, abs=PNG_LEVELS)
+
+
+def test_a_sheared_object_keeps_its_shape(facing, tmp_path):
+    """A square of 4, turned 45 degrees, below a parent that is stretched three times: a rhomb of 12."""
+    bpy.data.objects["behind"].hide_render = True
+    facing.scale = (0.02, 0.02, 1.0)  # 2 x 2
+    facing.rotation_euler.z = np.radians(45)
+    parent = bpy.data.objects.new("parent", None)
+    parent.scale = (3.0, 1.0, 1.0)
+    bpy.context.scene.collection.objects.link(parent)
+    facing.parent = parent
+    facing.location.z = -10.0
+    camera = bpy.context.scene.camera.data
+    camera.type, camera.ortho_scale = "ORTHO", 10.0
+    facing.data.color_attributes["Patchlight"].data.foreach_set("color", np.full(16, 1.0, np.float32))
+    _wear(facing, _principled(1.0, roughness=1.0))
+    # area of the square, times 3, of 100; edges of 16 x 16 pixels of 64 points: a hundredth
+    assert _seen(tmp_path, bounces=0, samples=64) == pytest.approx(0.12, abs=0.01)
+
+
 def test_a_metal_has_no_mirror_of_a_dielectric_over_its_own(facing, tmp_path):
     _wear(facing, _principled(0.2, metallic=1.0, roughness=picture_rays.ROUGH / 2, ior=3.0))
     assert _seen(tmp_path, scale=8) == pytest.approx(0.2 * 0.5 * 0.8 * LIGHT, abs=PNG_LEVELS / 8)
