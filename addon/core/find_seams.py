@@ -23,7 +23,7 @@ DEPTH = 0.3  # no farther down,
 LEVEL = 0.02  # whose plane the edge is off by no more
 SAME_NORMAL = np.cos(np.radians(1.5))  # of shading, of both sides
 APART = 0.5  # texels; what is looked up nearer to each other has no seam
-SIGHTS = (0.5, 1.5)  # texels above the surface, from where the edge is to see all texels that are looked up; from lower
+SIGHTS = (0.5, 1.0)  # texels above the surface, from where the edge is to see all texels that are looked up; from lower
 # a ball of few texels would hide its own: what lies flat is met on the way up, by each from
 LYING = 0.02  # times the first of these
 NEAR = 3.0  # texels away is what is looked up; where charts touch, others' texels are
