@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from .picture_rays import GLASS, chosen, dimmed, feed, make_sharp, traced_glass, traced_glossy, traced_principled
+from .picture_nodes import chosen, dimmed, feed, make_sharp
+from .picture_rays import GLASS, traced_glass, traced_glossy, traced_principled
 from .read_materials import DIFFUSE, GLOSSY, PASSING, TRANSLUCENT, VELVET
 from .read_mesh import LIGHTMAP_LAYER
 from .shader_nodes import Unreadable, conductor_colour

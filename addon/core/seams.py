@@ -34,10 +34,6 @@ class Seams:
     receivers: np.ndarray
     shares: np.ndarray
 
-    def jumps(self, values):
-        """What is seen on one side more than on the other, of values (N, C): (M, C)."""
-        return np.einsum("mk,mkc->mc", self.shares, values[self.receivers])
-
     def _alike(self, values):
         """The receivers and shares of those points whose two sides show about as much of values (N, 3)."""
         seen = self.shares * luminance_of(values[self.receivers])
