@@ -1,8 +1,6 @@
 /* A light as one receiver samples it. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "aimed_light.h"
 
-#include "polygon.h"
-
 /* Lamps that are larger from here are sampled by solid angle [sr]. One sample alone has to stay below what a hemisphere
    of the lamp's radiance would give; many are spread better over the area, until only what is nearest counts. */
 static const float large_for_one = 0.01f, large_for_many = 2.5f;

@@ -3,9 +3,11 @@
 #define PATCHLIGHT_AIMED_LIGHT_H
 
 #include "light_kinds.h"
+#include "polygon.h"
 
-/* A rectangle leaves 3 triangles above the horizon, a triangle 2. */
+/* Above the horizon a triangle leaves 2, and a rectangle, which is a lamp by itself, MAX_CLIPPED - 2 of them. */
 enum { MOST_RISEN = 2 * EXACT_TRIANGLES };
+_Static_assert(MAX_CLIPPED - 2 <= MOST_RISEN, "a rectangle has room");
 
 /* A piece of a lamp's face above the horizon. */
 typedef struct risen_triangle {

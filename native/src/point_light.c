@@ -68,24 +68,29 @@ float point_importance(const point_light *light, vec3 point) {
     return greater(share, light->radius > 0 ? 0.01f : 0);
 }
 
+/* A direction, even over the solid angle of a cone about an axis; (x, y) of the unit square. */
+static vec3 direction_in_cone(vec3 axis, float one_minus_cos_max, float x, float y) {
+    vec3 u, v;
+    vec3_basis(axis, &u, &v);
+    const float one_minus_cos = x * one_minus_cos_max, angle = 2 * PL_PI * y;
+    const float side = sqrtf(greater(one_minus_cos * (2 - one_minus_cos), 0));
+    const vec3 across = vec3_mul_add(u, side * cosf(angle), vec3_scale(v, side * sinf(angle)));
+    return vec3_mul_add(axis, 1 - one_minus_cos, across);
+}
+
 /* A uniform direction in the cone that a sphere fills; its solid angle over the area of a disc of its radius. */
 static bool sample_sphere(const point_light *light, vec3 to, float distance, float x, float y, vec3 *out_direction,
                           float *out_far, float *out_over_disc) {
-    vec3 u, v;
     const vec3 axis = vec3_scale(to, 1 / distance);
     const float sine = light->radius / distance;
-    const float angle = 2 * PL_PI * y;
     if (sine >= 1)
         return false;
-    vec3_basis(axis, &u, &v);
     /* 1 - cos without cancellation for small lamps far away */
     const float one_minus_cos_max = sine * sine / (1 + sqrtf(1 - sine * sine));
     const float one_minus_cos = x * one_minus_cos_max;
-    const float cosine = 1 - one_minus_cos;
-    const float side = sqrtf(greater(one_minus_cos * (2 - one_minus_cos), 0));
-    const vec3 across = vec3_mul_add(u, side * cosf(angle), vec3_scale(v, side * sinf(angle)));
-    *out_direction = vec3_mul_add(axis, cosine, across);
-    *out_far = distance * cosine - sqrtf(greater(light->radius * light->radius - distance * distance * side * side, 0));
+    const float cosine = 1 - one_minus_cos, side = distance * sqrtf(greater(one_minus_cos * (2 - one_minus_cos), 0));
+    *out_direction = direction_in_cone(axis, one_minus_cos_max, x, y);
+    *out_far = distance * cosine - sqrtf(greater(light->radius * light->radius - side * side, 0));
     *out_over_disc = 2 / (distance * distance * (1 + sqrtf(1 - sine * sine)));
     return true;
 }
@@ -134,15 +139,11 @@ float sun_importance(const float *p, vec3 normal) {
 }
 
 bool sample_sun(const float *p, vec3 normal, float x, float y, pl_light_sample *out) {
-    vec3 u, v;
-    const vec3 axis = vec3_from(p);
-    vec3_basis(axis, &u, &v);
-    /* a disc on the sky, narrow enough for its projection to stand for it */
-    const float radius = tanf(p[6]) * sqrtf(x), angle = 2 * PL_PI * y;
-    const vec3 across = vec3_mul_add(u, radius * cosf(angle), vec3_scale(v, radius * sinf(angle)));
-    out->direction = vec3_unit(vec3_add(axis, across));
+    /* a disc of radiance E / (pi sin^2), whose solid angle is 2 pi (1 - cos) */
+    const float half = sinf(0.5f * lesser(p[6], 0.5f * PL_PI)), one_minus_cos_max = 2 * half * half;
+    out->direction = direction_in_cone(vec3_from(p), one_minus_cos_max, x, y);
     out->far = INFINITY;
     const float cosine = vec3_dot(out->direction, normal);
-    scaled(p + 3, cosine, out->irradiance);
+    scaled(p + 3, 2 * cosine / (2 - one_minus_cos_max), out->irradiance);
     return cosine > 0;
 }

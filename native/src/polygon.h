@@ -4,7 +4,9 @@
 
 #include "vec3.h"
 
-enum { MAX_CORNERS = 4, MAX_CLIPPED = MAX_CORNERS + 1 };
+/* A flat polygon leaves one corner more than it has. One that lies in the horizon is flat no longer once its corners
+   are rounded: its heights may alternate, and every edge that crosses leaves one, beside every other corner. */
+enum { MAX_CORNERS = 4, MAX_CLIPPED = 3 * MAX_CORNERS / 2 };
 
 /* What of a polygon is above the horizon of the origin; how many corners that has. */
 int clip_to_horizon(const dvec3 *corners, int count, dvec3 normal, dvec3 *out_clipped);
