@@ -9,6 +9,9 @@ import json
 import tempfile
 from pathlib import Path
 
+from .cli_bake import bake_arguments, run_bake
+from .in_blender import CommandError, with_blender
+
 SCENES = ("cube", "l-room", "spheres")
 BLEND_ERRORS, QUICK_ERRORS = (0.1, 0.05, 0.02), (0.1,)
 QUICK_TEXELS = 1 << 16
@@ -61,8 +64,6 @@ def run_bench(args) -> None:
 
 def _checked(args):
     """Fail before the work rather than after it; the reference, None where none is asked for."""
-    from .cli import CommandError, with_blender
-
     if (args.blend is None) != (args.reference is None):
         raise CommandError("--blend and --reference go together: the one is baked, the other says how it should be")
     if args.out:
@@ -85,7 +86,7 @@ def _blend_rows(args, reference, options, tell):
     with tempfile.TemporaryDirectory() as folder:
         for error in QUICK_ERRORS if options.is_quick else BLEND_ERRORS:
             names = ("blend", args.blend.stem, "auto", "auto", f"error {error:g}")
-            command = ["bake", str(args.blend), "--error", str(error), "--seed", str(options.seed),
+            command = [str(args.blend), "--error", str(error), "--seed", str(options.seed),
                        "--threads", str(options.threads)]  # fmt: skip
             if options.is_quick:
                 command += ["--texels", str(QUICK_TEXELS)]
@@ -97,16 +98,15 @@ def _blend_rows(args, reference, options, tell):
 
 def _baked(command, reference, folder):
     """One bake into a file that is thrown away; how to judge it."""
-    from . import cli
     from .core.bench_row import Outcome
 
     output, told = folder / "baked.blend", folder / "report.json"
     # its line about the file, and its warnings, are not this command's
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        cli.run_bake(cli.parser().parse_args([*command, "--output", str(output), "--report", str(told)]))
+        run_bake(bake_arguments([*command, "--output", str(output), "--report", str(told)]))
 
     def judge():
-        with cli.with_blender():
+        with with_blender():
             from .blender.files import open_blend
             from .blender.score_bake import score
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from addon import cli
+from addon.cli_bake import bake_arguments, settings_from
 from addon.progress import ProgressBar, clock_text, line, seconds_left
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -66,13 +67,14 @@ def test_help_waits_for_neither_blender_nor_numpy():
         (["--texels", "65536"], "texels", 65536),
         (["--density", "32"], "density", 32.0),
         (["--keep-uvs"], "keep_uvs", True),
+        (["--smooth-angle", "45"], "smooth_angle_deg", 45.0),
         (["--patch-size", "0.5"], "patch_size", 0.5),
         (["--seed", "7"], "seed", 7),
         (["--threads", "2"], "threads", 2),
     ],
 )
 def test_each_option_reaches_the_settings(words, name, value):
-    settings = cli.settings_from(cli.parser().parse_args(["bake", "in.blend", *words]))
+    settings = settings_from(bake_arguments(["in.blend", *words]))
     assert getattr(settings, name) == value
 
 
@@ -239,6 +241,36 @@ def test_a_bake_that_fails_after_opening_keeps_an_older_result(room_blend, capsy
     older.write_bytes(b"older")
     fails_with_one_line(capsys, ["bake", room_blend, "--objects", "sofa"], "sofa")
     assert older.read_bytes() == b"older"
+
+
+def test_what_stands_where_the_exr_should_go_is_told_before_the_bake(room_blend, capsys):
+    folder = room_blend.with_name("exr")
+    folder.write_bytes(b"a file")
+    fails_with_one_line(capsys, ["bake", room_blend, "--exr", folder], "exr")
+    assert folder.read_bytes() == b"a file"
+    assert not room_blend.with_name("room_baked.blend").exists()
+
+
+def test_a_result_is_saved_though_its_exr_cannot_be(room_blend, capsys, monkeypatch):
+    from addon.blender import files
+
+    def full_disk(image, path):
+        raise files.FileError(f"{path}: cannot be saved (No space left on device)")
+
+    monkeypatch.setattr(files, "save_exr", full_disk)
+    folder, report = room_blend.with_name("exr"), room_blend.with_name("report.json")
+    words = ["bake", room_blend, "--exr", folder, "--report", report, *QUICK]
+    assert cli.main([str(word) for word in words]) == 1
+    assert "No space left" in capsys.readouterr().err
+    assert room_blend.with_name("room_baked.blend").exists()
+    assert report.exists()
+
+
+def test_a_lightmap_that_is_not_there_is_missed_before_the_render(room_blend, capsys):
+    folder = room_blend.parent
+    words = ["picture", room_blend, folder / "p.png", "--lightmap", folder / "l.png"]
+    fails_with_one_line(capsys, words, "holds no lightmap")
+    assert not (folder / "p.png").exists()
 
 
 def test_a_picture_has_the_shape_of_the_scene(room_blend, capfd):

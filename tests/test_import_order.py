@@ -13,7 +13,7 @@ ADDON = ROOT / "addon"
 MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "core": {"core"}}
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
-    *("ranges", "settings", "environment", "scene", "sound_faces", "textures", "emitters", "sky"),
+    *("ranges", "settings", "environment", "scene", "triangles", "sound_faces", "textures", "emitters", "sky"),
     *("relative", "z_order"),
     *("report", "workers", "kernel", "patches", "parted", "joined"),
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
@@ -40,6 +40,8 @@ CORE_ORDER = (
     *("peak_memory", "bench_row", "bench_cube", "bench_scenes", "bench_peers", "bench_factors", "bench_light", "bench"),
     "bench_plot",
 )
+# and so does a file at the top
+TOP_ORDER = ("progress", "in_blender", "cli_bake", "cli_bench", "cli", "registration")
 BLENDER = {"bpy", "bmesh", "mathutils", "bpy_extras", "gpu", "idprop"}
 
 
@@ -85,6 +87,16 @@ def test_the_core_imports_in_its_own_order():
         before = {*CORE_ORDER[: CORE_ORDER.index(path.stem)], *(["_kernel"] if path.stem == "kernel" else [])}
         seen = {(module or name).split(".")[0] for level, module, name in imports(path) if level == 1}
         assert seen <= before, f"core/{path.name} imports {seen - before}"
+
+
+def test_the_files_at_the_top_import_in_their_own_order():
+    for path in sorted(ADDON.glob("*.py")):
+        if path.stem == "__init__":
+            continue
+        assert path.stem in TOP_ORDER, f"{path.name} is not in TOP_ORDER: give it its place"
+        seen = {(module or name).split(".")[0] for level, module, name in imports(path) if level == 1}
+        files = {name for name in seen if not (ADDON / name).is_dir()}
+        assert files <= set(TOP_ORDER[: TOP_ORDER.index(path.stem)]), f"{path.name} imports {files}"
 
 
 def test_the_core_knows_nothing_of_blender():

@@ -35,6 +35,11 @@ def write_lightmap(targets, lightmap, image, keeps_uvs: bool) -> None:
         blender_object.update_tag()
 
 
+def lightmap_of(objects):
+    """The image that these objects are baked into: all targets of a bake share one; None without a bake."""
+    return next((ob[IMAGE_PROPERTY] for ob in objects if ob.get(IMAGE_PROPERTY) is not None), None)
+
+
 def _write_uvs(targets, objects, lightmap):
     by_mesh = {}
     for target, blender_object in zip(targets, objects):

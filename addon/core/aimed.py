@@ -11,7 +11,8 @@ import numpy as np
 
 from .kernel import KernelScene, sobol_points
 from .polygon import above, bisect, extent, fault_of, polygon_area, unit_normal
-from .quadrature import fan, triangle_areas
+from .quadrature import fan
+from .triangles import triangle_areas
 
 APART = 1.2  # distance of two parts' centres, in the sum of their radii, from which rays may be aimed at one
 PAIRS_LIMIT = 256  # of parts

@@ -25,7 +25,8 @@ from .polygon import (
     subtract,
     unit_normal,
 )
-from .quadrature import fan, polygon_rule, triangle_areas, triangle_rule
+from .quadrature import fan, polygon_rule, triangle_rule
+from .triangles import triangle_areas
 from .visibility import blocking_part, blocks_all, clip_all, integrate_partly_hidden, visible_factors
 
 FAR = 3.0  # distance of centres in radii of both: Gauss converges like (2 FAR)^(-2 n) or faster

@@ -12,6 +12,7 @@ from .receivers import Receivers
 from .scene import Scene
 from .smoothing import TexelGrid
 from .textures import scattered_shares
+from .triangles import unit_normals
 from .vertex_graph import VertexGraph
 from .vertices import BESIDE_CORNERS, vertex_receivers
 
@@ -83,8 +84,7 @@ def _only_objects_with(scene: Scene, is_wanted):
 def _behind(scene: Scene, receivers: Receivers) -> Receivers:
     """The same points in the planes of their triangles, looking the other way: a smooth surface bulges to one side."""
     corners = scene.corners[receivers.triangle_sides // 2]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    normals = unit_normals(corners)
     heights = np.einsum("nc,nc->n", receivers.positions - corners[:, 0], normals)
     positions = receivers.positions - heights[:, None] * normals
     return Receivers(positions, -receivers.normals, receivers.triangle_sides ^ 1)

@@ -30,7 +30,10 @@ from .vertices import vertex_receivers
 from .workers import OnProgress, Progress, Workers
 
 # how a bake's time falls to its stages, for the progress bar
-STAGE_SHARES = {"unwrap": 0.15, "texels": 0.05, "solve": 0.1, "gather": 0.7}
+STAGE_SHARES = {
+    "lightmap": {"unwrap": 0.15, "texels": 0.05, "solve": 0.1, "gather": 0.7},
+    "vertex": {"texels": 0.1, "solve": 0.15, "gather": 0.75},
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +65,7 @@ def bake(
     sound = sound_faces(scene)
     _require_targets(sound)
     scene = with_suns(sound.scene)
-    progress = Progress(on_progress, STAGE_SHARES)
+    progress = Progress(on_progress, STAGE_SHARES[settings.target])
 
     def seconds_left():
         return np.inf if settings.time_limit is None else settings.time_limit - progress.elapsed
@@ -128,8 +131,7 @@ def _require_targets(sound: SoundFaces) -> None:
     if any(obj.is_target and obj.count for obj in sound.scene.objects):
         return
     if any(obj.is_target and obj.count for obj in sound.whole.objects):
-        reasons = "; ".join(sound.scene.warnings[len(sound.whole.warnings) :][:1])
-        raise SceneError(f"nothing to bake: no face of the target objects can be: {reasons}")
+        raise SceneError(f"nothing to bake: no face of the target objects can be: {sound.target_faults[0]}")
     raise SceneError("nothing to bake: the scene has no target object with faces")
 
 

@@ -18,7 +18,7 @@ from .bench_light import bake_rows, solver_rows
 from .bench_peers import installed_peers
 from .bench_row import BenchRow
 from .bench_scenes import SCENES, exact_scene
-from .settings import SettingsError
+from .settings import SettingsError, thread_count
 from .workers import Workers
 
 PACKAGES = ("patchlight", "numpy", "embreex", "xatlas", "bpy", "pyviewfactor", "raystrack", "matplotlib")
@@ -49,11 +49,12 @@ class BenchOptions:
                 raise SettingsError(f"scene is {name}: allowed is {', '.join(SCENES)}")
         if self.runs < 1:
             raise SettingsError(f"runs is {self.runs}: allowed is 1 and above")
+        thread_count(self.threads)
 
     @property
     def thread_count(self) -> int:
         """Threads to run, at least 1."""
-        return self.threads or os.cpu_count() or 1
+        return thread_count(self.threads)
 
 
 def run_bench(options: BenchOptions, on_row: Callable[[BenchRow], None] | None = None) -> tuple[list[BenchRow], list]:

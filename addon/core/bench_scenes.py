@@ -19,10 +19,11 @@ from .bodies import sphere
 from .case_scene import box, l_room
 from .closed_forms import two_surfaces
 from .dense import solve_direct
-from .patches import Patches, patch_triangles, triangle_areas
+from .patches import Patches, patch_triangles
 from .polygon import are_coplanar, distinct_corners, unit_normal
 from .quadrature import fan
 from .scene import Material, Scene, SceneObject, radiance_from_exitance
+from .triangles import triangle_areas, unit_normals
 
 WHOLE = 1e30  # a patch size at which every triangle is one patch [m]
 PORTS = (0.1, 0.2)  # area fractions that the two spheres' common port takes of each
@@ -145,8 +146,7 @@ def _scene(polygons, rho, is_lit):
     fans = [fan(polygon) for polygon in polygons]
     corners = np.concatenate(fans)
     owners = np.repeat(np.arange(len(fans)), [len(part) for part in fans])
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = unit_normals(corners)
     vertices, triangles = np.unique(corners.reshape(-1, 3).round(12), axis=0, return_inverse=True)
     scene = Scene(
         vertices=vertices,
@@ -183,6 +183,6 @@ def _polygons(scene, patches):
 def even_points(scene: Scene, count: int, seed: int):
     """Some ``count`` random points by area: triangles int32 (N,), barycentrics float64 (N, 3)."""
     rng = np.random.default_rng(seed)
-    areas = triangle_areas(scene)
+    areas = triangle_areas(scene.corners)
     triangles = np.sort(rng.choice(len(areas), count, p=areas / areas.sum())).astype(np.int32)
     return triangles, rng.dirichlet((1, 1, 1), count)

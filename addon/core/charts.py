@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from .scene import Scene, SceneError
+from .triangles import area_vectors
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +113,12 @@ def target_surface(scene: Scene, groups=()) -> TargetSurface:
         raise SceneError("nothing to bake: the scene has no target object with faces")
     triangles = np.concatenate(triangles)
     corners = scene.vertices[scene.triangles[triangles]]
-    area_vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-    if not area_vectors.any():
+    vectors = area_vectors(corners)
+    if not vectors.any():
         raise SceneError("nothing to bake: no face of the target objects has an area")
     polygons = np.unique(np.concatenate(polygons), return_inverse=True)[1]
-    areas = np.linalg.norm(area_vectors, axis=1)
-    return TargetSurface(triangles, tuple(objects), corners, area_vectors, areas, polygons, np.concatenate(loops))
+    areas = np.linalg.norm(vectors, axis=1)
+    return TargetSurface(triangles, tuple(objects), corners, vectors, areas, polygons, np.concatenate(loops))
 
 
 def weld(points):

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from .conjugate_gradient import EXCHANGE_LIMIT
-from .patches import triangle_areas
 from .scene import Scene
 from .settings import BakeSettings, SettingsError
+from .triangles import triangle_areas
 
 EXCHANGE_TRIANGLES = 3000  # up to which "auto" takes conjugate gradients, which keep 4 n^2 bytes
 BRIGHT_ROOM = 0.8  # mean reflectance from which conjugate gradients need less time than stochastic Jacobi,
@@ -68,5 +68,5 @@ def _choose_rays(settings, material):
 def mean_reflectance(scene: Scene) -> float:
     """Mean over the scene's area of the brightest channel; textures, not read yet, count as grey."""
     brightest = [max(m.reflectance) * (0.5 if m.reflectance_texture is not None else 1.0) for m in scene.materials]
-    areas = triangle_areas(scene)
+    areas = triangle_areas(scene.corners)
     return float((areas * np.array(brightest)[scene.triangle_materials]).sum() / max(areas.sum(), 1e-300))

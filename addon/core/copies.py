@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .charts import FlatCharts
-from .patches import triangle_areas
 from .scene import Scene, SceneError, SceneObject
+from .triangles import triangle_areas
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ def copies_of(scene: Scene) -> tuple[tuple[SceneObject, ...], ...]:
         if obj.is_target and obj.count and obj.mesh is not None:
             by_mesh.setdefault(obj.mesh, []).append(obj)
     groups = [group for group in by_mesh.values() if len(group) > 1]
-    areas = triangle_areas(scene) if groups else None
+    areas = triangle_areas(scene.corners) if groups else None
     return tuple(_model_first(areas, group) for group in groups)
 
 

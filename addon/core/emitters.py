@@ -9,6 +9,7 @@ import numpy as np
 from .environment import from_octahedron
 from .scene import AreaLight, PointLight, Scene, SunLight
 from .textures import textured_colours
+from .triangles import triangle_areas
 
 POINT, AREA, SUN, MESH = 0, 1, 2, 3
 LIGHT_FLOATS, PROFILE_SIDE = 24, 128  # PL_LIGHT_FLOATS, PL_PROFILE_SIDE
@@ -141,7 +142,7 @@ def _glowing_triangles(scene):
     open_sides = np.array([m.open_side or "" for m in scene.materials])[scene.triangle_materials[owners]]
     radiances[open_sides == "front", :3] = 0
     radiances[open_sides == "back", 3:] = 0
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = triangle_areas(corners)
     keep = (areas > 0) & (radiances.max(axis=1, initial=0.0) > 0) & _is_first(corners)
     return corners[keep], radiances[keep]
 
@@ -196,9 +197,10 @@ def _groups(corners, radiances):
 
 def _flux(corners, radiances):
     """What a triangle's brighter side sends out, for choosing (N,)."""
-    areas = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     sides = radiances.reshape(-1, 2, 3)
-    return areas * (sides @ LUMINANCE + 1e-6 * sides.max(axis=2, initial=0.0)).max(axis=1, initial=0.0)
+    return triangle_areas(corners) * (sides @ LUMINANCE + 1e-6 * sides.max(axis=2, initial=0.0)).max(
+        axis=1, initial=0.0
+    )
 
 
 def _group_row(corners, radiances, first):

@@ -13,6 +13,7 @@ from .lookup import bilinear
 from .receivers import Receivers, surface_receivers
 from .scene import Scene
 from .seams import NO_SEAMS, Seams
+from .triangles import unit_normals
 
 SAME_UV = 1 / 1024  # texels: what edges of triangles that lie beside each other in a chart may differ by
 BLOCK = 1 << 18  # triangles, or points on edges, at once
@@ -176,9 +177,7 @@ def _corners(scene, triangles):
 
 
 def _flat_normals(scene, triangles):
-    corners = _corners(scene, triangles)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return unit_normals(_corners(scene, triangles))
 
 
 def _ahead(uvs, triangles, corners):

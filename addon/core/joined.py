@@ -10,6 +10,7 @@ import numpy as np
 from .kernel import KernelScene
 from .patches import Grid, Patches, patch_middles
 from .scene import Scene
+from .triangles import unit_normals
 
 SMALL = 0.25  # of a full-size patch's area: larger pieces stay as they are
 TURN = 0.5  # by which components of the normals are told apart
@@ -123,6 +124,4 @@ def _joined_by(kernel: KernelScene, grid: Grid, pieces: Patches, first) -> Patch
 
 def _normals(scene: Scene, triangles):
     """Unit normals of triangles (K,), float64 (K, 3)."""
-    a, b, c = (scene.vertices[scene.triangles[triangles, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    return normals / np.maximum(np.sqrt(np.einsum("nk,nk->n", normals, normals)), 1e-300)[:, None]
+    return unit_normals(scene.vertices[scene.triangles[triangles]])

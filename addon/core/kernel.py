@@ -99,23 +99,23 @@ class KernelScene:
         _kernel.patch_points(self._patches, patches, samples, seed, triangles, barycentrics)
         return triangles, barycentrics
 
-    def form_factors_monte_carlo(self, sides, rays, seed):
+    def form_factors_monte_carlo(self, sides, rays, seed, on_step=None):
         """Rows of form factors, float32 (len(sides), side_count), by cosine rays."""
 
         def rows(part, out):
             _kernel.form_factors_monte_carlo(self._scene, self._patches, part, rays, seed, out)
 
-        return self._form_factor_rows(sides, rows)
+        return self._form_factor_rows(sides, rows, on_step)
 
-    def form_factors_hemicube(self, sides, resolution, positions, seed):
+    def form_factors_hemicube(self, sides, resolution, positions, seed, on_step=None):
         """Rows of form factors, float32 (len(sides), side_count), by hemicubes."""
 
         def rows(part, out):
             _kernel.form_factors_hemicube(self._scene, self._patches, part, resolution, positions, seed, out)
 
-        return self._form_factor_rows(sides, rows)
+        return self._form_factor_rows(sides, rows, on_step)
 
-    def _form_factor_rows(self, sides, rows):
+    def _form_factor_rows(self, sides, rows, on_step):
         sides = _rows(sides, np.int32)
         out = np.empty((len(sides), self.side_count), np.float32)
 
@@ -125,7 +125,7 @@ class KernelScene:
             rows(sides[start:stop], sums)
             out[start:stop] = sums
 
-        self.workers.each_range(len(sides), 8, call)
+        self.workers.each_range(len(sides), 8, call, on_step)
         return out
 
     def openness(self, reaches, rays, seed):

@@ -12,6 +12,7 @@ import numpy as np
 from .kernel import KernelScene
 from .patches import Patches
 from .scene import Scene
+from .triangles import area_vectors
 
 RAYS = 1 << 13  # of each group: what two of them exchange is known to two per cent or so
 FLUX = 1 << 20  # of a ray, in the kernel's fixed point
@@ -53,8 +54,7 @@ def measured_laws(scene: Scene, kernel: KernelScene, patches: Patches, seed: int
 
 def _groups(scene: Scene, patches: Patches):
     """Of every side, which way it looks, about: 0 ... 5 for +x, -x, +y, -y, +z, -z (2 P,)."""
-    corners = scene.corners
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = area_vectors(scene.corners)
     axes = np.argmax(np.abs(normals), axis=1)
     fronts = (2 * axes + (normals[np.arange(len(axes)), axes] < 0)).astype(np.int8)[patches.triangles]
     return np.stack([fronts, fronts ^ 1], axis=1).ravel()

@@ -93,10 +93,15 @@ def _pack_at_density(surface, density):
         packing = _pack_once(surface, density, min(width, 1 << 15))
         area = packing.texels
     if area > MOST_TEXELS:
-        raise SettingsError(
-            f"density is {density:g} texels/m: the lightmap would have {area:.3g} texels, allowed are {MOST_TEXELS}"
-        )
+        raise too_dense(density, area)
     return packing
+
+
+def too_dense(density, texels) -> SettingsError:
+    """The error for a density [texels/m] that would take so many texels."""
+    return SettingsError(
+        f"density is {density:g} texels/m: the lightmap would have {texels:.3g} texels, allowed are {MOST_TEXELS}"
+    )
 
 
 def _pack_into(surface, texels, workers):

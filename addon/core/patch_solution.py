@@ -11,6 +11,7 @@ from .kernel import KernelScene
 from .parted import is_parted
 from .patches import Patches, patch_triangles
 from .scene import Scene, radiance_from_exitance
+from .triangles import triangle_areas
 
 EVEN, MIXED_SIDE, LIGHT = 0, 1, 2  # kinds of sides, as the kernel has them
 MIXED = 0.5  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
@@ -110,7 +111,7 @@ def with_bright_sides(scene: Scene, centre, patches: Patches, emitters: Emitters
     radiances = np.zeros((len(shining), 2, 3))
     radiances[which, bright % 2] = radiance_from_exitance(radiosity[bright])
     corners, which = patch_triangles(scene, patches, shining)
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    met = patches.met[shining] / np.maximum(0.5 * np.bincount(which, areas), 1e-300)
+    areas = triangle_areas(corners)
+    met = patches.met[shining] / np.maximum(np.bincount(which, areas), 1e-300)
     radiances *= np.minimum(met, 1.0)[:, None, None]
     return with_sources(emitters, corners[areas > 0], radiances.reshape(-1, 6)[which[areas > 0]], centre)

@@ -15,6 +15,7 @@ from .kernel import KernelScene
 from .scene import Scene
 from .settings import SettingsError
 from .textures import textured_colours
+from .triangles import triangle_areas
 
 TEXTURE_SAMPLES = 8  # points a patch on which its texture is averaged,
 CUT_OUT_SAMPLES = 32  # and what an image cuts out of it: flux is divided by what is left
@@ -97,15 +98,9 @@ class Patches:
         return radiosity
 
 
-def triangle_areas(scene: Scene):
-    """Areas of the triangles, float64 (T,) [m^2]."""
-    a, b, c = np.moveaxis(scene.corners, 1, 0)
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-
-
 def patch_size_for(scene: Scene, budget: int) -> float:
     """The patch size [m] at which the scene's triangles come to about ``budget`` patches."""
-    areas = triangle_areas(scene)
+    areas = triangle_areas(scene.corners)
     low, high = 1e-9 * max(areas.max(initial=0.0), 1e-12), max(areas.sum(), 1e-12)
     for _ in range(60):
         middle = np.sqrt(low * high)
@@ -138,7 +133,7 @@ class Grid:
 
 def grid_of(scene: Scene, size: float, budget: int) -> Grid:
     """The grid of cells of at most about ``size`` [m]."""
-    areas = triangle_areas(scene)
+    areas = triangle_areas(scene.corners)
     apexes, longest = _apexes(scene)
     # a triangle that would take more than its share gets larger cells; a sliver takes them along its length
     share = budget * LARGEST_SHARE

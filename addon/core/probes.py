@@ -17,6 +17,7 @@ from .lookup import bilinear
 from .receivers import Receivers, surface_receivers
 from .relative import scale_of
 from .scene import Scene
+from .triangles import triangle_areas
 from .vertex_graph import VertexGraph
 
 LEAST_PROBES, MOST_PROBES = 512, 2048
@@ -135,8 +136,7 @@ def seen_through_corners(scene: Scene, graph: VertexGraph, seed: int) -> SeenPoi
 def _random_points(scene, is_usable, count, seed):
     """Points by area on the usable triangles of the targets: triangles int32 (M,), barycentrics float64 (M, 3)."""
     rng = np.random.default_rng([seed, 0x5EE4])
-    corners = scene.corners
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    areas = triangle_areas(scene.corners)
     areas[~is_usable] = 0.0
     total = areas.sum()
     for obj in scene.objects:

@@ -6,6 +6,8 @@ import functools
 
 import numpy as np
 
+from .triangles import triangle_areas
+
 
 @functools.cache
 def gauss(count: int):
@@ -26,12 +28,6 @@ def triangle_rule(count: int):
 def fan(corners):
     """Triangles (K - 2, 3, 3) of a convex polygon (K, 3), all from its first corner."""
     return np.stack([np.broadcast_to(corners[0], (len(corners) - 2, 3)), corners[1:-1], corners[2:]], axis=1)
-
-
-def triangle_areas(triangles):
-    """Areas of triangles (..., 3, 3) [m^2]."""
-    a, b, c = np.moveaxis(triangles, -2, 0)
-    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=-1)
 
 
 def polygon_rule(corners, count: int):

@@ -18,7 +18,7 @@ from .laws import Laws, measured_laws
 from .parted import finer_where_parted
 from .patch_light import QUICK_ERROR, PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides
-from .patches import MOST_PATCHES, Grid, Patches, cut, grid_of, patch_size_for, subdivide, triangle_areas
+from .patches import MOST_PATCHES, Grid, Patches, cut, grid_of, patch_size_for, subdivide
 from .progressive import solve_progressive
 from .scene import Scene
 from .settings import BakeSettings
@@ -26,6 +26,7 @@ from .sky import sky_map
 from .solver import Solution
 from .stochastic import solve_stochastic
 from .transport import form_factors
+from .triangles import triangle_areas
 from .workers import within
 
 # patches, about, that each solver is given; triangles are never joined, so there may be more
@@ -37,7 +38,11 @@ ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where
 LIGHTMAP_ERROR = QUICK_ERROR  # at the least, is good enough for patches, and small ones are joined, where a lightmap
 MOST_AREA = 0.9  # has texels on so much of the scene: looks from one to the other mend the light, unless there are
 MANY_LIGHTS = 64  # or more (as in native/src/gather.c): where rays go on they take what patches have of these
-MOST_SHOT = 500_000  # sides get 8 rays each, at an error of 0.05; of more, gather rays see the mean of many
+USUAL_ERROR = 0.05  # for which the stochastic solver shoots
+RAYS_A_SIDE = 8  # in the first step, shared by flux,
+MOST_SHOT = 500_000  # of no more than so many sides: of more, gather rays see the mean of many,
+LEAST_RAYS, MOST_RAYS = 1 << 18, 1 << 25  # and of enough where there are few; what the smallest errors may ask for
+ROWS_SHARE = 0.8  # of the time of a solver that takes all rows of form factors go to these
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it
@@ -143,7 +148,7 @@ def _solved(
 
 def _target_share(scene: Scene) -> float:
     """Of the scene's area, how much is baked."""
-    areas = triangle_areas(scene)
+    areas = triangle_areas(scene.corners)
     return sum(areas[obj.span].sum() for obj in scene.objects if obj.is_target) / max(areas.sum(), 1e-300)
 
 
@@ -198,7 +203,8 @@ def solve_patches(kernel, patches, emitted, solver, method, error, seed, on_step
     """Radiosity of all sides from what they emit, float64 (2 P, 3) [W/m^2], by a named solver and method."""
     areas, reflectance = patches.side_areas, np.minimum(patches.side_reflectance, MOST_REFLECTANCE)
     if solver == "stochastic":
-        rays = int(min(max(8 * min(len(emitted), MOST_SHOT), 1 << 18) * (0.05 / error), 1 << 25))
+        usual = max(RAYS_A_SIDE * min(len(emitted), MOST_SHOT), LEAST_RAYS)
+        rays = int(min(usual * (USUAL_ERROR / error), MOST_RAYS))
         translucence = np.minimum(patches.translucence, MOST_REFLECTANCE - reflectance[::2])
         return solve_stochastic(kernel, reflectance, emitted, areas, rays, UNSHOT_LIMIT, seed, on_step, translucence)
     estimator = form_factors(kernel, method, error, seed)
@@ -206,7 +212,11 @@ def solve_patches(kernel, patches, emitted, solver, method, error, seed, on_step
         return solve_progressive(estimator, reflectance, emitted, areas, UNSHOT_LIMIT, on_step)
     require_size = require_direct_size if solver == "direct" else require_exchange_size
     require_size(len(emitted))
-    exchange = exchange_of(estimator.rows(np.arange(len(emitted))), areas)
+    # with the most patches and the smallest errors this is minutes
+    rows = estimator.rows(np.arange(len(emitted)), within(on_step, 0.0, ROWS_SHARE))
+    on_step = within(on_step, ROWS_SHARE, 1 - ROWS_SHARE)
+    exchange = exchange_of(rows, areas)
+    on_step(0.0)
     if solver == "direct":
         solution = solve_direct(exchange.form_factors(areas), reflectance, emitted, areas)
     else:

@@ -8,6 +8,7 @@ import numpy as np
 
 from .kernel import KernelScene
 from .scene import Scene
+from .triangles import unit_normals
 
 BLOCK = 1 << 16  # receivers that are placed at once: with all corners of all they would take ten times their memory
 EDGE_INSET = 1e-3  # of a triangle: receivers keep so far off its edges
@@ -57,8 +58,7 @@ def _placed(barycentrics, corners, corner_normals):
     # exactly on an edge a ray can slip between the face and the wall that stands on it
     weights = np.maximum(barycentrics.astype(np.float64), EDGE_INSET)
     weights /= weights.sum(axis=1, keepdims=True)
-    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    flat = unit_normals(corners)
     positions = np.einsum("nk,nkc->nc", weights, corners)
     normals = np.einsum("nk,nkc->nc", weights, corner_normals)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -83,8 +83,7 @@ def patch_receivers(scene: Scene, kernel: KernelScene, patches, samples: int, se
     barycentrics = barycentrics.astype(np.float64)
     barycentrics /= barycentrics.sum(axis=1, keepdims=True)
     corners = scene.corners[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    normals = unit_normals(corners)
     positions = np.einsum("nk,nkc->nc", barycentrics, corners)
 
     def both(front, back):

@@ -67,14 +67,20 @@ class BakeSettings:
         _require("patch_size", self.patch_size, self.patch_size is None or self.patch_size > 0, "above 0 m")
         _require("smooth_angle_deg", self.smooth_angle_deg, 0 <= self.smooth_angle_deg <= 180, "0 ... 180 degrees")
         _require("seed", self.seed, 0 <= self.seed < 1 << 32, "0 ... 4294967295")
-        _require("threads", self.threads, 0 <= self.threads <= 1024, "0 ... 1024")
+        thread_count(self.threads)
         if self.method == "hemicube" and self.solver == "stochastic":
             raise SettingsError("solver stochastic shoots Monte Carlo rays: it cannot use method hemicube")
 
     @property
     def thread_count(self) -> int:
         """Threads to run, at least 1."""
-        return self.threads or os.cpu_count() or 1
+        return thread_count(self.threads)
+
+
+def thread_count(threads: int) -> int:
+    """Threads to run, at least 1, where ``threads`` are asked for, and 0 is all cores."""
+    _require("threads", threads, 0 <= threads <= 1024, "0 ... 1024")
+    return threads or os.cpu_count() or 1
 
 
 def _require(name, value, holds, allowed):

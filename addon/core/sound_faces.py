@@ -26,11 +26,13 @@ class SoundFaces:
     scene : Scene, what is left; its warnings name what is not
     kept : bool (T,) which of the whole scene's triangles are left
     whole : Scene, as it was
+    target_faults : a sentence for each fault of a target's faces
     """
 
     scene: Scene
     kept: np.ndarray
     whole: Scene
+    target_faults: tuple[str, ...]
 
     def spread(self, values):
         """Values per corner of the sound triangles (K, 3, C) -> of all (T, 3, C).
@@ -62,10 +64,13 @@ def sound_faces(scene: Scene) -> SoundFaces:
         (f"are farther than {LARGEST_COORDINATE:g} m from the origin", is_far & ~is_unusable),
         ("have no area", ~(kept | is_far | is_unusable)),
     )
-    warnings = [*scene.warnings, *(_warning(obj, what, bad[obj.span]) for what, bad in faults for obj in scene.objects)]
+    found = [(obj, _warning(obj, what, bad[obj.span])) for what, bad in faults for obj in scene.objects]
+    found = [(obj, sentence) for obj, sentence in found if sentence]
     sound = scene if kept.all() else _only(scene, kept)
     sound, more = _finite_attributes(_used_vertices(sound))
-    return SoundFaces(replace(sound, warnings=tuple(filter(None, [*warnings, *more]))), kept, scene)
+    warnings = (*scene.warnings, *(sentence for _, sentence in found), *filter(None, more))
+    target_faults = tuple(sentence for obj, sentence in found if obj.is_target)
+    return SoundFaces(replace(sound, warnings=warnings), kept, scene, target_faults)
 
 
 def _have_area(corners):

@@ -21,9 +21,9 @@ class MonteCarloFormFactors:
     rays: int
     seed: int
 
-    def rows(self, sides):
+    def rows(self, sides, on_step=None):
         """Form factors from sides (K,) to all sides, float32 (K, 2 P)."""
-        return self.kernel.form_factors_monte_carlo(sides, self.rays, self.seed)
+        return self.kernel.form_factors_monte_carlo(sides, self.rays, self.seed, on_step)
 
     @property
     def rays_per_row(self) -> int:
@@ -45,9 +45,9 @@ class HemicubeFormFactors:
     positions: int
     seed: int
 
-    def rows(self, sides):
+    def rows(self, sides, on_step=None):
         """Form factors from sides (K,) to all sides, float32 (K, 2 P)."""
-        return self.kernel.form_factors_hemicube(sides, self.resolution, self.positions, self.seed)
+        return self.kernel.form_factors_hemicube(sides, self.resolution, self.positions, self.seed, on_step)
 
     @property
     def rays_per_row(self) -> int:

@@ -11,9 +11,10 @@ from .charts import Charts, target_surface
 from .copies import copies_of, layouts
 from .cut import cut
 from .flatten import flatten
-from .packing import Surface, pack
+from .packing import MOST_TEXELS, Surface, pack, too_dense
 from .scene import Scene, SceneError
 from .settings import BakeSettings
+from .triangles import triangle_areas
 
 
 def unwrap(scene: Scene, settings: BakeSettings, on_step: Callable[[float], None] | None = None) -> Charts:
@@ -23,12 +24,13 @@ def unwrap(scene: Scene, settings: BakeSettings, on_step: Callable[[float], None
     within bilinear reach of two charts, and one free texel lies between them for mipmaps. Polygons stay whole: a loop
     has one UV, and where objects share a mesh, one place within each object's rectangle. Same input, same bytes.
 
-    With ``settings.keep_uvs`` the objects' own UVs decide, over a square of ``settings.texels``; they may overlap.
+    With ``settings.keep_uvs`` the objects' own UVs decide, over a square of ``settings.texels``, or of a density that
+    is ``settings.density`` over all surfaces; they may overlap.
 
     ``on_step(done)`` hears after each stage how much (0..1) is done; what it raises ends the work.
     """
     if settings.keep_uvs:
-        return _kept(scene, settings.texels)
+        return _kept(scene, settings)
     groups = copies_of(scene)
     surface = target_surface(scene, groups)
     on_step = on_step or (lambda done: None)
@@ -41,20 +43,29 @@ def unwrap(scene: Scene, settings: BakeSettings, on_step: Callable[[float], None
     return charts
 
 
-def _kept(scene, texels):
+def _kept(scene, settings):
     target_surface(scene)  # says where there is nothing to bake
-    side = math.isqrt(texels)
+    targets = [obj for obj in scene.objects if obj.is_target and obj.count]
+    kept_uvs = [_checked_uvs(obj) for obj in targets]
+    side = math.isqrt(settings.texels) if settings.density is None else _side(scene, targets, kept_uvs, settings)
     uvs = np.full((len(scene.triangles), 3, 2), np.nan, np.float32)
     charts = np.full(len(scene.triangles), -1, np.int32)
     chart_count = 0
-    for obj in scene.objects:
-        if not obj.is_target or not obj.count:
-            continue
-        kept = _checked_uvs(obj)
+    for obj, kept in zip(targets, kept_uvs):
         uvs[obj.span] = kept * np.float32(side)
         charts[obj.span] = _connected(kept) + chart_count
         chart_count = int(charts[obj.span].max()) + 1
     return Charts(uvs, charts, side, side)
+
+
+def _side(scene, targets, uvs, settings):
+    """Texels along a square in which the targets' UVs (N, 3, 2) have all of their surface's texels at a density."""
+    area = sum(float(triangle_areas(scene.corners[obj.span]).sum()) for obj in targets)
+    share = sum(float(triangle_areas(np.pad(kept, ((0, 0), (0, 0), (0, 1)))).sum()) for kept in uvs)
+    texels = area * settings.density**2 / share if share > 0 else math.inf
+    if texels > MOST_TEXELS:
+        raise too_dense(settings.density, texels)
+    return max(round(math.sqrt(texels)), 1)
 
 
 def _checked_uvs(obj):

@@ -7,6 +7,7 @@ import numpy as np
 from .kernel import KernelScene
 from .receivers import Receivers, surface_receivers
 from .scene import Scene
+from .triangles import triangle_areas, unit_normals
 from .vertex_graph import VertexGraph, vertex_graph
 
 INSET = 1 / 12  # of a triangle: a vertex is where surfaces touch, so its receivers stand a little inside their faces
@@ -26,9 +27,7 @@ def vertex_receivers(scene: Scene, kernel: KernelScene, smooth_angle_deg: float)
     receivers = surface_receivers(scene, np.repeat(triangles, 3), np.tile(BESIDE_CORNERS, (len(triangles), 1)))
 
     corners = scene.corners[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    areas, normals = 0.5 * lengths, normals / np.maximum(lengths, 1e-300)[:, None]
+    areas, normals = triangle_areas(corners), unit_normals(corners)
     distances = np.linalg.norm(receivers.positions - corners.reshape(-1, 3), axis=1)
     # a face without area must not make a mean without weight
     areas = np.repeat(areas, 3) + 1e-12 * max(areas.max(initial=0.0), 1e-30)

@@ -14,7 +14,8 @@ import numpy as np
 from .kinks import kinks_of
 from .lambert import element_factors
 from .polygon import above, bisect, clip, extent, fault_of, heights_above, unit_normal
-from .quadrature import fan, triangle_areas, triangle_rule
+from .quadrature import fan, triangle_rule
+from .triangles import triangle_areas
 
 COARSE, FINE = 3, 5  # nodes along a triangle's side; the difference is the error of a cell
 KINKS_AT_ONCE, CELLS_AT_ONCE = 200, 400  # with no more kinks than this, cells are cut along all of them at the start

@@ -84,9 +84,8 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
         began = time.perf_counter()
         try:
             scene = context.scene
-            metres_per_unit = scene.unit_settings.scale_length
             options = scene.patchlight
-            settings, subdivide = options.to_settings(metres_per_unit), options.subdivide_metres(metres_per_unit)
+            settings, subdivide = options.to_settings(scene.unit_settings.scale_length), options.edge_length
             names = _names_to_bake(context)
             self._prepared = bake_scene.prepare(scene, settings, names, subdivide, options.apply_modifiers)
             library = denoiser_library()
@@ -165,17 +164,23 @@ class PATCHLIGHT_OT_bake(bpy.types.Operator):
         bake_scene.discard(self._prepared)
         bpy.context.window_manager.patchlight.is_baking = False
 
+    def leave_and_abandon(self):
+        """The same while its window stays: what it shows there goes."""
+        self._leave(bpy.context)
+        self.abandon()
+
 
 def cancel_running():
     """End a bake that still runs and wait for its thread; for when the add-on goes."""
     if _running is not None:
-        _running.abandon()
+        _running.leave_and_abandon()
 
 
 def _names_to_bake(context):
     if not context.scene.patchlight.only_selected:
         return None
-    return [ob.name for ob in context.selected_objects]
+    # lamps and cameras are selected with the room that they stand in
+    return [ob.name for ob in context.selected_objects if ob.type == "MESH"]
 
 
 def _sentence(error):

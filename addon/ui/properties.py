@@ -145,7 +145,10 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
     )
 
     def to_settings(self, metres_per_unit: float) -> BakeSettings:
-        """The settings of a bake; lengths become metres."""
+        """The settings of a bake, whose metres are Blender's units, as in Cycles: those of light, whatever is shown.
+
+        Properties of lengths are kept in these units; what is given per metre is per metre as shown.
+        """
         by_density = self.target == "lightmap" and self.size_mode == "DENSITY"
         return BakeSettings(
             target=self.target,
@@ -154,20 +157,19 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
             error=self.error,
             time_limit=self.time_limit if self.use_time_limit else None,
             texels=self.size * self.size,
-            density=self.density if by_density else None,
+            density=self.density * metres_per_unit if by_density else None,
             keep_uvs=self.target == "lightmap" and self.keep_uvs,
-            patch_size=self.patch_size * metres_per_unit if self.use_patch_size else None,
+            patch_size=self.patch_size if self.use_patch_size else None,
             smooth_angle_deg=degrees(self.smooth_angle),
             denoise=self.denoise,
             seed=self.seed,
             threads=self.threads,
         )
 
-    def subdivide_metres(self, metres_per_unit: float) -> float | None:
-        """Edge length to cut faces to [m], None to leave them."""
-        if self.target == "vertex" and self.use_subdivide:
-            return self.subdivide * metres_per_unit
-        return None
+    @property
+    def edge_length(self) -> float | None:
+        """What to cut faces to [m], None to leave them."""
+        return self.subdivide if self.target == "vertex" and self.use_subdivide else None
 
 
 class PATCHLIGHT_PG_state(bpy.types.PropertyGroup):

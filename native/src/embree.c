@@ -30,6 +30,7 @@ static int load_functions(pl_embree *embree) {
     return load(embree, "rtcNewDevice", &embree->new_device) &&
            load(embree, "rtcReleaseDevice", &embree->release_device) &&
            load(embree, "rtcGetDeviceProperty", &embree->device_property) &&
+           load(embree, "rtcGetDeviceError", &embree->device_error) &&
            load(embree, "rtcNewScene", &embree->new_scene) && load(embree, "rtcReleaseScene", &embree->release_scene) &&
            load(embree, "rtcSetSceneFlags", &embree->set_scene_flags) &&
            load(embree, "rtcSetSceneBuildQuality", &embree->set_scene_quality) &&
@@ -73,7 +74,7 @@ static int layout_is_as_declared(const pl_embree *embree) {
     rayhit.hit.padding[0] = 0x12345678u;
     embree->intersect(scene, &rayhit, NULL);
     embree->release_scene(scene);
-    return vertex_buffer && index_buffer && is_about(rayhit.ray.tfar, 1.0f) && rayhit.hit.primID == 0 &&
+    return embree->device_error(embree->device) == RTC_ERROR_NONE && vertex_buffer && index_buffer && is_about(rayhit.ray.tfar, 1.0f) && rayhit.hit.primID == 0 &&
            is_about(rayhit.hit.u, 0.25f) && is_about(rayhit.hit.v, 0.5f) && rayhit.hit.Ng_z > 0 &&
            rayhit.hit.padding[0] == 0x12345678u;
 }

@@ -18,9 +18,9 @@ enum {
     RTC_FORMAT_UINT3 = 0x5003,
     RTC_FORMAT_FLOAT3 = 0x9003,
     RTC_SCENE_FLAG_ROBUST = 1 << 2,
-    RTC_BUILD_QUALITY_MEDIUM = 1,
     RTC_BUILD_QUALITY_HIGH = 2,
     RTC_DEVICE_PROPERTY_VERSION = 0,
+    RTC_ERROR_NONE = 0,
 };
 #define RTC_INVALID_ID 0xFFFFFFFFu
 
@@ -53,6 +53,7 @@ struct pl_embree {
     RTCDevice (*new_device)(const char *);
     void (*release_device)(RTCDevice);
     long (*device_property)(RTCDevice, int);
+    int (*device_error)(RTCDevice); /* the first since it was last asked */
     RTCScene (*new_scene)(RTCDevice);
     void (*release_scene)(RTCScene);
     void (*set_scene_flags)(RTCScene, int);

@@ -75,7 +75,9 @@ static pl_status build_layer(pl_scene *scene, bool clear, pl_layer *out_layer) {
         embree->attach_geometry(out_layer->bvh, geometry);
     }
     embree->commit_scene(out_layer->bvh);
-    status = PL_OK;
+    /* all that can fail with arrays that were checked is memory; of a tree that was not built no ray would say so */
+    if (embree->device_error(embree->device) == RTC_ERROR_NONE)
+        status = PL_OK;
 done:
     if (geometry)
         embree->release_geometry(geometry);

@@ -8,6 +8,7 @@ bpy = pytest.importorskip("bpy")
 
 from addon import registration  # noqa: E402 - needs bpy
 from addon.blender import picture  # noqa: E402
+from addon.blender.bake_scene import discard, prepare  # noqa: E402
 from addon.core.settings import METHODS, SOLVERS, TARGETS, BakeCancelled, BakeSettings  # noqa: E402
 from addon.ui.job import BakeJob  # noqa: E402
 from addon.ui.properties import PATCHLIGHT_PG_settings  # noqa: E402
@@ -73,22 +74,35 @@ def test_the_menus_offer_what_the_core_knows(registered, name, choices):
     assert tuple(item.identifier for item in items) == choices
 
 
-def test_lengths_become_metres(registered):
+@pytest.mark.parametrize("metres_per_unit", [1.0, 0.01])
+def test_lengths_are_those_of_the_scene_whatever_its_unit_scale(registered, metres_per_unit):
     empty_file()
     options = bpy.context.scene.patchlight
-    options.target, options.use_patch_size, options.use_subdivide = "vertex", True, True
-    options.patch_size, options.subdivide = 50.0, 25.0
-    centimetres = 0.01
-    # 32-bit floats again
-    assert options.to_settings(centimetres).patch_size == pytest.approx(0.5, rel=1e-6)
-    assert options.subdivide_metres(centimetres) == pytest.approx(0.25, rel=1e-6)
+    options.use_patch_size, options.use_subdivide, options.target = True, True, "vertex"
+    bpy.ops.mesh.primitive_cube_add(size=1.0)
+    # a quarter of the cube's edge, as Blender shows and keeps it: in units of the scene
+    options.patch_size = options.subdivide = 0.25
+    settings = options.to_settings(metres_per_unit)
+    assert settings.patch_size == 0.25
+    prepared = prepare(bpy.context.scene, settings, None, options.edge_length, False)
+    # 4 x 4 squares a side, of which cutting leaves two triangles each
+    assert len(prepared.scene.triangles) == 6 * 16 * 2
+    discard(prepared)
+
+
+def test_a_density_is_per_metre_as_shown(registered):
+    empty_file()
+    options = bpy.context.scene.patchlight
+    options.size_mode, options.density = "DENSITY", 64.0
+    # one unit is a centimetre, and shows 64 texels a metre as 0.64
+    assert options.to_settings(0.01).density == pytest.approx(0.64, rel=1e-6)
 
 
 def test_options_that_do_not_belong_to_the_target_are_left_out(registered):
     empty_file()
     options = bpy.context.scene.patchlight
     options.size_mode, options.keep_uvs, options.use_subdivide = "DENSITY", True, True
-    assert options.subdivide_metres(1.0) is None
+    assert options.edge_length is None
     options.target = "vertex"
     assert options.to_settings(1.0).density is None
     assert options.to_settings(1.0).keep_uvs is False
@@ -150,6 +164,16 @@ def test_nothing_to_bake_is_an_error_that_changes_nothing(registered):
         bpy.ops.patchlight.bake()
     assert len(bpy.data.images) == 0
     assert bpy.ops.patchlight.bake.poll(), "the place of the running bake is free again"
+
+
+def test_a_selected_lamp_is_no_object_to_bake(room):
+    lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))
+    bpy.context.scene.collection.objects.link(lamp)
+    lamp.select_set(True)
+    room.select_set(True)
+    bpy.context.scene.patchlight.only_selected = True
+    assert bpy.ops.patchlight.bake() == {"FINISHED"}
+    assert room["patchlight_lightmap"] is not None
 
 
 def test_only_selected_without_a_selection_is_an_error(room):

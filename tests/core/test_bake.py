@@ -227,7 +227,7 @@ def test_progress_rises_to_the_end_and_comes_from_the_calling_thread(settings):
     assert {stage for stage, _, _ in told} <= set(result.report.seconds)
     assert fractions == sorted(fractions)
     assert 0 <= fractions[0]
-    assert fractions[-1] <= 1
+    assert fractions[-1] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("target", ["lightmap", "vertex"])

@@ -9,11 +9,12 @@ from addon.core.decomposition import MOST_ALONG, finer, patches_at
 from addon.core.emitters import LUMINANCE, emitters_of
 from addon.core.gather_sums import no_sums
 from addon.core.guides import no_guides
-from addon.core.patches import cut, grid_of, patch_size_for, triangle_areas
+from addon.core.patches import cut, grid_of, patch_size_for
 from addon.core.receivers import surface_receivers
 from addon.core.relative import scale_of
 from addon.core.settings import BakeSettings
 from addon.core.texel_light import NO_TEXEL_LIGHT
+from addon.core.triangles import triangle_areas
 from tests.scenes import cornell_box, cube_room, kernel_of, lamp, rectangle, scene_of
 
 SQUARE = rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0))
@@ -96,7 +97,7 @@ def solved_by_gradients(scene, kernel, monkeypatch, **settings):
 def even_points(scene, count):
     """Points by area: triangles (N,), barycentrics (N, 3)."""
     rng = np.random.default_rng(0)
-    areas = triangle_areas(scene)
+    areas = triangle_areas(scene.corners)
     return rng.choice(len(areas), count, p=areas / areas.sum()).astype(np.int32), rng.dirichlet((1, 1, 1), count)
 
 

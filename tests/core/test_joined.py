@@ -6,9 +6,10 @@ import pytest
 from addon.core.joined import SMALL, TURN, joined
 from addon.core.laws import measured_laws
 from addon.core.parted import finer_where_parted
-from addon.core.patches import grid_of, patch_triangles, triangle_areas
+from addon.core.patches import grid_of, patch_triangles
 from addon.core.radiosity import solve_patches
 from addon.core.scene import Material, Texture
+from addon.core.triangles import triangle_areas
 from tests.scenes import box, kernel_of, rectangle, scene_of, sphere
 
 SIZE, BUDGET = 0.2, 10000
@@ -71,7 +72,7 @@ def test_areas_add_up_and_points_fall_on_each_triangle_by_its_area():
         patches = patches_of(scene, kernel)
         triangles, _ = kernel.patch_points(np.arange(len(patches)), 1 << 12, 0)
     assert np.bincount(patches.owners, patches.pieces.areas) == pytest.approx(patches.areas, rel=1e-12)
-    areas = triangle_areas(scene)
+    areas = triangle_areas(scene.corners)
     assert patches.areas.sum() == pytest.approx(areas.sum(), rel=1e-12)
     met = np.bincount(triangles, np.repeat(patches.areas, 1 << 12) / (1 << 12), len(areas))
     # stratified: two points of 4096 at the borders of each triangle's share, of patches of a few triangles

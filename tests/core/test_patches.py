@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from addon.core.patches import LARGEST_SHARE, cut, grid_of, patch_size_for, subdivide, triangle_areas
+from addon.core.patches import LARGEST_SHARE, cut, grid_of, patch_size_for, subdivide
 from addon.core.scene import Material, Texture
+from addon.core.triangles import triangle_areas
 from tests.reference.patches import area_share, depth_in, patch_polygons
 from tests.scenes import Part, cornell_box, kernel_of, rectangle, scene_of
 
@@ -18,7 +19,7 @@ def layout(scene, patches):
     corners = scene.corners[0]
     edges = [np.linalg.norm(corners[(k + 2) % 3] - corners[(k + 1) % 3]) for k in range(3)]
     apex = int(np.argmax(edges))
-    rows = max(1, int(np.ceil(2 * triangle_areas(scene)[0] / (edges[apex] * patches.size) - 1e-6)))
+    rows = max(1, int(np.ceil(2 * triangle_areas(scene.corners)[0] / (edges[apex] * patches.size) - 1e-6)))
     columns = [max(1, int(np.ceil(edges[apex] * (1 - r / rows) / patches.size - 1e-6))) for r in range(rows)]
     return apex, columns
 
@@ -28,13 +29,13 @@ def test_points_of_a_patch_lie_in_it_and_areas_are_those_of_the_polygons(seed):
     rng = np.random.default_rng(seed)
     scene = one_triangle(rng)
     with kernel_of(scene) as kernel:
-        patches = subdivide(scene, kernel, 0.2 * np.sqrt(triangle_areas(scene)[0]), 10_000, 0)
+        patches = subdivide(scene, kernel, 0.2 * np.sqrt(triangle_areas(scene.corners)[0]), 10_000, 0)
         triangles, weights = kernel.patch_points(np.arange(len(patches)), 64, seed)
     polygons = patch_polygons(*layout(scene, patches))
     assert len(polygons) == len(patches) > 20
     assert (triangles == 0).all()
     shares = np.array([area_share(p) for p in polygons])
-    assert patches.areas / triangle_areas(scene)[0] == pytest.approx(shares, rel=1e-9)
+    assert patches.areas / triangle_areas(scene.corners)[0] == pytest.approx(shares, rel=1e-9)
     depths = [depth_in(p, w) for p, w in zip(polygons, weights.reshape(-1, 64, 3).astype(float))]
     assert np.min(depths) > -1e-6  # float32 weights
 
@@ -42,7 +43,7 @@ def test_points_of_a_patch_lie_in_it_and_areas_are_those_of_the_polygons(seed):
 def test_patches_of_cells_that_are_cut_finer_make_up_their_cell():
     """Areas add up to the whole cell's, bounds to its bounds, and points lie within them."""
     scene = one_triangle(np.random.default_rng(9))
-    grid = grid_of(scene, 0.3 * np.sqrt(triangle_areas(scene)[0]), 10_000)
+    grid = grid_of(scene, 0.3 * np.sqrt(triangle_areas(scene.corners)[0]), 10_000)
     along = np.random.default_rng(10).choice([1, 2, 4, 5], len(grid))
     with kernel_of(scene) as kernel:
         whole = cut(scene, kernel, grid, np.ones(len(grid), np.int64), 0)
@@ -71,7 +72,7 @@ def test_a_ray_finds_the_patch_whose_point_it_aims_at(seed):
     rng = np.random.default_rng(seed)
     scene = one_triangle(rng)
     with kernel_of(scene) as kernel:
-        patches = subdivide(scene, kernel, 0.2 * np.sqrt(triangle_areas(scene)[0]), 10_000, 0)
+        patches = subdivide(scene, kernel, 0.2 * np.sqrt(triangle_areas(scene.corners)[0]), 10_000, 0)
     a, b, c = scene.corners[0]
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal)
@@ -99,7 +100,7 @@ def test_areas_add_up_to_the_triangles():
     with kernel_of(scene) as kernel:
         patches = subdivide(scene, kernel, 0.07, 100_000, 0)
     sums = np.bincount(patches.triangles, patches.areas, len(scene.triangles))
-    assert sums == pytest.approx(triangle_areas(scene), rel=1e-12)
+    assert sums == pytest.approx(triangle_areas(scene.corners), rel=1e-12)
     assert (np.diff(patches.triangles) >= 0).all()
     # the longest edge is cut to the size, so no patch is larger than its square
     assert patches.areas.max() <= 0.07**2 * (1 + 1e-9)
@@ -110,7 +111,7 @@ def test_areas_by_sampling_equal_the_areas_given():
     rng = np.random.default_rng(7)
     scene = one_triangle(rng)
     with kernel_of(scene) as kernel:
-        patches = subdivide(scene, kernel, 0.25 * np.sqrt(triangle_areas(scene)[0]), 10_000, 0)
+        patches = subdivide(scene, kernel, 0.25 * np.sqrt(triangle_areas(scene.corners)[0]), 10_000, 0)
     points = rng.dirichlet((1, 1, 1), 40_000)
     depths = np.array([depth_in(p, points) for p in patch_polygons(*layout(scene, patches))])
     counts = np.bincount(depths.argmax(axis=0), minlength=len(patches))
@@ -124,7 +125,7 @@ def test_points_are_even_within_a_patch():
     """The mean of a patch's points is its centroid."""
     scene = one_triangle(np.random.default_rng(8))
     with kernel_of(scene) as kernel:
-        patches = subdivide(scene, kernel, 0.3 * np.sqrt(triangle_areas(scene)[0]), 10_000, 0)
+        patches = subdivide(scene, kernel, 0.3 * np.sqrt(triangle_areas(scene.corners)[0]), 10_000, 0)
         _, weights = kernel.patch_points(np.arange(len(patches)), 4096, 0)
     for polygon, found in zip(patch_polygons(*layout(scene, patches)), weights.reshape(-1, 4096, 3).astype(float)):
         a, b, c, d = polygon

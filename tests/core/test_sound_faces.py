@@ -1,5 +1,7 @@
 """Bad faces are left out with their number and owner, and change no bit of what is left."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -92,6 +94,13 @@ def test_a_corner_on_a_straight_edge_gets_the_colour_of_its_polygon():
 def test_nothing_but_bad_faces_is_refused_with_the_reason(target):
     with pytest.raises(SceneError, match=r"nothing to bake.*object bad: 1 of 1 triangles have no area"):
         baked([bad_part(["line"])], target)
+
+
+def test_the_reason_is_that_of_what_was_to_be_baked():
+    scene = scene_of([bad_part(["NaN"], "stand"), bad_part(["line"], "floor")], (LAMP,))
+    scene = replace(scene, objects=(replace(scene.objects[0], is_target=False), scene.objects[1]))
+    with pytest.raises(SceneError, match=r"nothing to bake.*: object floor: 1 of 1 triangles have no area"):
+        bake(scene, BakeSettings(texels=1024))
 
 
 def test_shading_normals_and_uvs_that_are_no_numbers_are_ignored_and_named():

@@ -1,6 +1,7 @@
 """Unwrap: every triangle has a place of its own, polygons whole, true to scale, in no more texels than asked."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -189,8 +190,6 @@ def test_a_small_chart_finds_the_hole_of_a_large_one():
 
 def keeping(uvs):
     scene = scene_of(([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 2, 3)]))
-    from dataclasses import replace
-
     kept = None if uvs is None else np.float32(uvs)
     return replace(scene, objects=(replace(scene.objects[0], lightmap_uvs=kept),))
 
@@ -210,6 +209,17 @@ def test_kept_uvs_decide():
 def test_kept_uvs_that_hang_together_are_one_chart():
     charts = unwrap(keeping([LEFT, [[0, 0], [0.5, 0.5], [0, 0.5]]]), KEEP)
     assert charts.charts.tolist() == [0, 0]
+
+
+def test_a_density_decides_how_many_texels_kept_uvs_lie_in():
+    """A square metre in a quarter of the layout: 20 texels a metre are 400 there and 1600 in all."""
+    charts = unwrap(keeping([LEFT, [[0, 0], [0.5, 0.5], [0, 0.5]]]), replace(KEEP, density=20))
+    assert (charts.width, charts.height) == (40, 40)
+    with pytest.raises(SettingsError, match="density is 1e\\+06 texels/m"):
+        unwrap(keeping([LEFT, RIGHT]), replace(KEEP, density=1e6))
+    without_area = np.zeros((2, 3, 2))
+    with pytest.raises(SettingsError, match="density is 20 texels/m"):
+        unwrap(keeping(without_area), replace(KEEP, density=20))
 
 
 @pytest.mark.parametrize(

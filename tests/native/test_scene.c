@@ -1,5 +1,6 @@
 /* Scenes whole, empty and broken. SPDX-License-Identifier: GPL-3.0-or-later */
 #include "check.h"
+#include "embree.h"
 #include "patches.h"
 #include "patchlight.h"
 
@@ -29,6 +30,19 @@ static void indices_out_of_range_are_refused(const pl_embree *embree) {
     const int32_t above[] = {0, 1, 4}, below[] = {0, -1, 2};
     CHECK(pl_scene_create(embree, tetrahedron, 4, above, 1, NULL, &scene) == PL_ERR_ARGUMENT);
     CHECK(pl_scene_create(embree, tetrahedron, 4, below, 1, NULL, &scene) == PL_ERR_ARGUMENT);
+    CHECK(!scene);
+}
+
+static int out_of_memory(RTCDevice device) {
+    (void)device;
+    return 4;
+}
+
+static void a_tree_that_was_not_built_is_no_scene(const pl_embree *embree) {
+    pl_scene *scene = NULL;
+    pl_embree failing = *embree;
+    failing.device_error = out_of_memory;
+    CHECK(pl_scene_create(&failing, tetrahedron, 4, faces, 4, NULL, &scene) == PL_ERR_MEMORY);
     CHECK(!scene);
 }
 
@@ -120,6 +134,7 @@ int main(void) {
     pl_embree *embree = open_embree();
     pl_scene *scene = NULL;
     indices_out_of_range_are_refused(embree);
+    a_tree_that_was_not_built_is_no_scene(embree);
     a_scene_of_nothing_has_no_hits(embree);
     CHECK(pl_scene_create(embree, tetrahedron, 4, faces, 4, NULL, &scene) == PL_OK);
     directions_need_not_be_unit(scene);

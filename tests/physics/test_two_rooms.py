@@ -8,9 +8,10 @@ import pytest
 from addon.core.bake import bake
 from addon.core.emitters import LUMINANCE
 from addon.core.lightmap import look_up
-from addon.core.patches import subdivide, triangle_areas
+from addon.core.patches import subdivide
 from addon.core.scene import AreaLight, Material
 from addon.core.settings import BakeSettings
+from addon.core.triangles import triangle_areas
 from tests.physics.lighting import direct_light, full_light
 from tests.physics.plates import well_inside
 from tests.scenes import box, kernel_of, rectangle, scene_of
@@ -19,7 +20,7 @@ from tests.scenes import box, kernel_of, rectangle, scene_of
 def points_of(scene, count):
     """Random points of the scene's surfaces, by area: triangles (N,), barycentrics (N, 3)."""
     rng = np.random.default_rng(0)
-    areas = triangle_areas(scene)
+    areas = triangle_areas(scene.corners)
     triangles = rng.choice(len(areas), count, p=areas / areas.sum())
     return triangles, rng.dirichlet((1, 1, 1), count)
 
