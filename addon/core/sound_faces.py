@@ -12,6 +12,7 @@ import numpy as np
 
 from .ranges import LARGEST_COORDINATE
 from .scene import Scene
+from .shading_normals import BEND, without_steep_normals
 
 # Twice the area over the two sides' lengths: the sine between them. Below this it is rounding, in float32 (scene.c).
 LEAST_SINE = np.float32(2.4e-7)
@@ -68,7 +69,8 @@ def sound_faces(scene: Scene) -> SoundFaces:
     found = [(obj, sentence) for obj, sentence in found if sentence]
     sound = scene if kept.all() else _only(scene, kept)
     sound, more = _finite_attributes(_used_vertices(sound))
-    warnings = (*scene.warnings, *(sentence for _, sentence in found), *filter(None, more))
+    sound, edges = _with_gentle_normals(sound)
+    warnings = (*scene.warnings, *(sentence for _, sentence in found), *filter(None, [*more, *edges]))
     target_faults = tuple(sentence for obj, sentence in found if obj.is_target)
     return SoundFaces(replace(sound, warnings=warnings), kept, scene, target_faults)
 
@@ -133,6 +135,19 @@ def _finite_attributes(scene):
         uvs = np.where(is_off[..., None], np.float32(0), uvs)
         warnings += [_attribute_warning(obj, "texture coordinates", is_off[obj.span]) for obj in scene.objects]
     return replace(scene, corner_normals=normals, uvs=uvs), warnings
+
+
+def _with_gentle_normals(scene):
+    normals, is_changed = without_steep_normals(scene)
+    warnings = [_edge_warning(obj, int(is_changed[obj.span].sum())) for obj in scene.objects]
+    return replace(scene, corner_normals=normals), warnings
+
+
+def _edge_warning(obj, count):
+    return count and (
+        f"object {obj.name}: {count} of {obj.count} triangles are shaded smooth over sharp edges: there they are baked "
+        f"as Shade Auto Smooth at {BEND:g} degrees shows them"
+    )
 
 
 def _attribute_warning(obj, what, is_bad):

@@ -209,7 +209,8 @@ void pl_shoot(const pl_scene *scene, const pl_patches *patches, const int32_t *s
 /*
  * Where light is wanted.
  *
- *   positions  3 doubles each, on the triangle, or lifted off it where it stands for a smooth surface
+ *   positions  3 doubles each, on the triangle, or lifted off it to the smooth surface that it stands for: rays that
+ *              leave below its plane start there
  *   normals    the shading normal: the cosine is measured from it
  *   triangles  index of the triangle each lies on, 2 * triangle + side
  *

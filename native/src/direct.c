@@ -86,13 +86,14 @@ bool direct_at_point(const pl_scene *scene, const pl_lights *lights, const pl_li
 }
 
 /* A ray of a smooth receiver may have to leave through its own triangle, which the smooth surface is not. */
-static bool is_hidden_from_smooth(const pl_scene *scene, const pl_receiver_frame *frame, vec3 direction, float far) {
-    const pl_hit hit = closest_hit(scene, frame->origin, direction, 0);
+static bool is_hidden_from_smooth(const pl_scene *scene, const pl_receiver_frame *frame, vec3 origin, vec3 direction,
+                                  float far) {
+    const pl_hit hit = closest_hit(scene, origin, direction, 0);
     if (hit.triangle < 0 || hit.distance >= far)
         return false;
     if (hit.triangle != frame->triangle)
         return true;
-    const vec3 through = vec3_mul_add(direction, hit.distance, frame->origin);
+    const vec3 through = vec3_mul_add(direction, hit.distance, origin);
     return is_occluded(scene, point_off_triangle(scene, frame->triangle, through, vec3_scale(frame->geometric, -1)),
                        direction, far - hit.distance);
 }
@@ -100,11 +101,18 @@ static bool is_hidden_from_smooth(const pl_scene *scene, const pl_receiver_frame
 /* Multiply a sample by what reaches the receiver; returns whether anything does. */
 static bool shine(direct_job *job, const pl_receiver_frame *frame, pl_light_sample *io_sample) {
     const bool below = vec3_dot(frame->geometric, io_sample->direction) <= 0;
+    const vec3 origin = ray_origin(frame, io_sample->direction);
     ++job->rays;
-    if (below ? !frame->is_smooth || is_hidden_from_smooth(job->scene, frame, io_sample->direction, io_sample->far)
-              : is_occluded(job->scene, frame->origin, io_sample->direction, io_sample->far))
+    if (below && frame->is_smooth && io_sample->far > 0 && io_sample->far < INFINITY) {
+        /* to the same point of the light */
+        io_sample->direction = vec3_mul_add(io_sample->direction, io_sample->far, vec3_scale(frame->lift, -1));
+        io_sample->far = 1;
+    }
+    if (below ? !frame->is_smooth ||
+                    is_hidden_from_smooth(job->scene, frame, origin, io_sample->direction, io_sample->far)
+              : is_occluded(job->scene, origin, io_sample->direction, io_sample->far))
         return false;
-    return transmit(job->scene, frame->origin, io_sample->direction, io_sample->far, io_sample->irradiance);
+    return transmit(job->scene, origin, io_sample->direction, io_sample->far, io_sample->irradiance);
 }
 
 typedef struct light_sums {

@@ -74,9 +74,9 @@ static int layout_is_as_declared(const pl_embree *embree) {
     rayhit.hit.padding[0] = 0x12345678u;
     embree->intersect(scene, &rayhit, NULL);
     embree->release_scene(scene);
-    return embree->device_error(embree->device) == RTC_ERROR_NONE && vertex_buffer && index_buffer && is_about(rayhit.ray.tfar, 1.0f) && rayhit.hit.primID == 0 &&
-           is_about(rayhit.hit.u, 0.25f) && is_about(rayhit.hit.v, 0.5f) && rayhit.hit.Ng_z > 0 &&
-           rayhit.hit.padding[0] == 0x12345678u;
+    return embree->device_error(embree->device) == RTC_ERROR_NONE && vertex_buffer && index_buffer &&
+           is_about(rayhit.ray.tfar, 1.0f) && rayhit.hit.primID == 0 && is_about(rayhit.hit.u, 0.25f) &&
+           is_about(rayhit.hit.v, 0.5f) && rayhit.hit.Ng_z > 0 && rayhit.hit.padding[0] == 0x12345678u;
 }
 
 pl_status pl_embree_open(const char *path, pl_embree **out_embree) {

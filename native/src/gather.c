@@ -103,7 +103,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
                        float *io_sum) {
     const pl_solution *solution = job->solution;
     float weight[3] = {1, 1, 1};
-    vec3 origin = frame->origin;
+    vec3 origin = ray_origin(frame, direction);
     bool skips_lights = true; /* what was sampled as a light must not be seen once more */
 
     for (int step = 0; step < MOST_STEPS; ++step) {

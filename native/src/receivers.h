@@ -8,6 +8,7 @@ typedef struct pl_receiver_frame {
     int32_t triangle;
     int side;
     vec3 origin;    /* off the triangle's plane */
+    vec3 lift;      /* from there to where the smooth surface is that the triangle stands for */
     vec3 geometric; /* the plane's normal on the receiver's side */
     vec3 shading;   /* where the cosine is measured from */
     bool is_smooth;
@@ -25,7 +26,24 @@ static inline pl_receiver_frame receiver_frame(const pl_scene *scene, const pl_r
     if (!frame.is_smooth)
         frame.shading = frame.geometric;
     frame.origin = point_off_triangle(scene, frame.triangle, point, frame.geometric);
+    frame.lift = (vec3){0, 0, 0};
+    if (frame.is_smooth) {
+        const vec3 corner = scene_vertex(scene, frame.triangle, 0);
+        const vec3 flat = vec3_mul_add(frame.geometric, -vec3_dot(vec3_sub(point, corner), frame.geometric), point);
+        const vec3 lifted = frame.origin;
+        frame.origin = point_off_triangle(scene, frame.triangle, flat, frame.geometric);
+        frame.lift = vec3_sub(lifted, frame.origin);
+    }
     return frame;
+}
+
+/*
+ * Where a ray starts. Above the triangle's plane the triangle is what there is. Below it is the rest of what bulges,
+ * which would shade what lies on it (the terminator): there rays start on the smooth surface.
+ */
+static inline vec3 ray_origin(const pl_receiver_frame *frame, vec3 direction) {
+    const bool is_below = frame->is_smooth && vec3_dot(frame->geometric, direction) <= 0;
+    return is_below ? vec3_add(frame->origin, frame->lift) : frame->origin;
 }
 
 static inline bool receiver_is_valid(const pl_scene *scene, const pl_receivers *receivers, size_t index) {

@@ -1,0 +1,86 @@
+"""Shading normals over edges that are none of a smooth surface, against the shapes that they are of."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from addon.core.shading_normals import without_steep_normals
+from addon.core.sound_faces import sound_faces
+from addon.core.triangles import area_vectors, unit_normals
+from tests.core.meshes import box, rough_sheet, scene_of, sphere
+
+
+def prism(sides, height=1.0):
+    """A prism of many sides about the z axis, with a polygon at either end."""
+    turns = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
+    after = np.roll(np.arange(sides), -1)
+    faces = [(k, a, sides + a, sides + k) for k, a in enumerate(after)]
+    faces += [tuple(range(sides, 2 * sides)), tuple(range(sides))[::-1]]
+    return np.concatenate([ring, ring + np.array([0, 0, height])]), faces
+
+
+def shaded_smooth(*meshes):
+    """All corners of a vertex with the mean of all faces about it, as Shade Smooth has them, by area."""
+    scene = scene_of(*meshes)
+    vectors = np.repeat(area_vectors(scene.corners), 3, axis=0)
+    sums = np.zeros_like(scene.vertices)
+    np.add.at(sums, scene.triangles.ravel(), vectors)
+    sums /= np.linalg.norm(sums, axis=1, keepdims=True)
+    return replace(scene, corner_normals=sums[scene.triangles].astype(np.float32))
+
+
+def flat_normals(scene):
+    return np.repeat(unit_normals(scene.corners)[:, None], 3, axis=1)
+
+
+def test_a_box_that_is_shaded_smooth_is_a_box():
+    scene = shaded_smooth(box())
+    normals, is_changed = without_steep_normals(scene)
+    assert normals == pytest.approx(flat_normals(scene), abs=1e-6)  # float32
+    assert is_changed.all()
+
+
+@pytest.mark.parametrize("sides", [6, 32])
+def test_a_prism_has_round_sides_and_flat_ends(sides):
+    scene = shaded_smooth(prism(sides))
+    normals, _ = without_steep_normals(scene)
+    is_end = np.abs(unit_normals(scene.corners)[:, 2]) > 0.5
+    assert normals[is_end] == pytest.approx(flat_normals(scene)[is_end], abs=1e-6)
+    out = scene.corners[~is_end] * (1, 1, 0)
+    # one triangle of a quad has its whole angle at a corner, and two have half of it each: any two sides weigh the same
+    assert normals[~is_end] == pytest.approx(out / np.linalg.norm(out, axis=2, keepdims=True), abs=1e-6)
+
+
+@pytest.mark.parametrize("mesh", [sphere(), rough_sheet(np.random.default_rng(0), height=0.1)], ids=["ball", "sheet"])
+def test_what_is_smooth_keeps_its_normals_to_the_bit(mesh):
+    scene = shaded_smooth(mesh)
+    normals, is_changed = without_steep_normals(scene)
+    assert normals is scene.corner_normals
+    assert not is_changed.any()
+
+
+def test_faces_that_are_shaded_flat_stay_flat():
+    """A box of which one side only is shaded smooth."""
+    scene = shaded_smooth(box())
+    flat = flat_normals(scene).astype(np.float32)
+    flat[:2] = scene.corner_normals[:2]
+    normals, is_changed = without_steep_normals(replace(scene, corner_normals=flat))
+    assert is_changed.tolist() == [True] * 2 + [False] * 10
+    assert (normals[2:] == flat[2:]).all()
+
+
+def test_normals_that_stand_for_the_face_are_left():
+    scene = scene_of(box())  # all are 0
+    normals, is_changed = without_steep_normals(scene)
+    assert normals is scene.corner_normals
+    assert not is_changed.any()
+
+
+def test_it_is_told_and_of_which_object():
+    smooth = shaded_smooth(box(), sphere(centre=(3, 0, 0)))
+    assert sound_faces(smooth).scene.warnings == (
+        "object object 0: 12 of 12 triangles are shaded smooth over sharp edges: there they are baked as Shade Auto "
+        "Smooth at 60 degrees shows them",
+    )
