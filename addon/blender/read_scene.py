@@ -100,8 +100,6 @@ class SceneReading:
         # The iterator's objects are temporary: nothing of them is kept past its turn of the loop. Curves and their
         # like come twice, as themselves and as meshes; only the meshes are taken.
         for instance in self.depsgraph.object_instances:
-            if instance.object.original.hide_render:
-                continue
             name = instance.object.name
             if instance.object.type in KINDS and self.visibility.shows(instance):
                 unseen[name] = KINDS[instance.object.type]

@@ -38,3 +38,51 @@ def test_instances_are_seen_as_far_as_what_makes_them(add_cube):
     scene = read_scene(bpy.context.scene)
     (chair,) = (o for o in scene.objects if o.name.startswith("Chair"))
     assert not scene.materials[scene.triangle_materials[chair.first]].meets_shadow_rays
+
+
+def test_what_is_hidden_is_instanced_but_by_collections(add_cube):
+    """As Cycles has it: sources of scatters are hidden as a rule; what is hidden in a collection has no instances."""
+    add_cube("Room")
+    for name in ("Leaf", "Pebble", "Ghost"):
+        add_cube(name).hide_render = True
+    scatter, faces, place = add_cube("Scatter"), add_cube("Faces"), bpy.data.objects.new("Place", None)
+    scatter.modifiers.new("Nodes", "NODES").node_group = nodes_that_instance(bpy.data.objects["Leaf"])
+    faces.instance_type, bpy.data.objects["Pebble"].parent = "FACES", faces
+    furniture = bpy.data.collections.new("Furniture")
+    for name in ("Ghost", "Room"):
+        furniture.objects.link(bpy.data.objects[name])
+    place.instance_type, place.instance_collection = "COLLECTION", furniture
+    bpy.context.scene.collection.objects.link(place)
+    names = [o.name.split("#")[0] for o in read_scene(bpy.context.scene).objects]
+    # the scatter's mesh goes where its nodes make another geometry; six faces make a pebble each
+    assert {name: names.count(name) for name in set(names)} == {"Room": 2, "Leaf": 1, "Faces": 1, "Pebble": 6}
+
+
+def nodes_that_instance(blender_object):
+    """Geometry nodes that give nothing but one instance of an object."""
+    tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    source, output = tree.nodes.new("GeometryNodeObjectInfo"), tree.nodes.new("NodeGroupOutput")
+    source.inputs["Object"].default_value, source.inputs["As Instance"].default_value = blender_object, True
+    tree.links.new(source.outputs["Geometry"], output.inputs[0])
+    return tree
+
+
+def test_a_hidden_object_is_not_a_linked_one_of_its_name(add_cube, tmp_path):
+    linked = add_cube("Slab")
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {linked})
+    bpy.data.objects.remove(linked)
+    add_cube("Room")
+    add_cube("Slab").hide_render = True
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, into):
+        into.objects = ["Slab"]
+    bpy.context.scene.collection.objects.link(into.objects[0])
+    into.objects[0].hide_render = False
+    hidden = bpy.data.collections.new("Hidden")
+    hidden.hide_render = True
+    bpy.context.scene.collection.children.link(hidden)
+    local = bpy.data.objects[("Slab", None)]
+    local.hide_render = False
+    hidden.objects.link(local)
+    bpy.context.scene.collection.objects.unlink(local)
+    assert sorted(o.name for o in read_scene(bpy.context.scene).objects) == ["Room", "Slab"]
