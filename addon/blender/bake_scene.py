@@ -17,7 +17,7 @@ from ..core.sound_faces import sound_faces
 from .new_meshes import NewMeshes, give_mesh
 from .read_scene import read_scene
 from .write_lightmap import lightmap_image, require_layer_room, write_lightmap
-from .write_vertex_colours import write_vertex_colours
+from .write_vertex_colours import require_colour_room, write_vertex_colours
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +67,7 @@ def prepare(
         scene = read_scene(bpy_scene, settings, object_names, new_meshes)
         targets = [scene_object.name for scene_object in scene.objects if scene_object.is_target]
         meshes = {name: _new_or_own_mesh(name, new_meshes) for name in targets}
-        if settings.target == "lightmap":
-            for name, mesh in meshes.items():
-                require_layer_room(name, mesh)
+        _require_room(settings, meshes)
     except BaseException:
         new_meshes.remove()
         raise
@@ -80,11 +78,10 @@ def prepare(
 def write(prepared: PreparedBake, result) -> None:
     """Store a BakeResult in the file: all of it, or nothing and a SceneError."""
     meshes = {target.name: _checked_mesh(prepared, target.name) for target in prepared.targets}
+    _require_room(prepared.settings, meshes)
     if prepared.settings.target == "lightmap":
         _require_finite("the lightmap", result.lightmap.pixels)
         _require_complete(prepared, result.lightmap.uvs, "lightmap UVs")
-        for name, mesh in meshes.items():
-            require_layer_room(name, mesh)
         if not prepared.settings.keep_uvs:
             _require_same_sharing(prepared.targets, meshes)
     else:
@@ -116,6 +113,14 @@ def _require_subdivide(settings, subdivide):
         raise SettingsError(f"subdivide is {subdivide}: allowed is above 0 m")
     if settings.target != "vertex":
         raise SettingsError("subdivide cuts meshes for vertex colours: it goes with target vertex only")
+
+
+def _require_room(settings, meshes):
+    for name, mesh in meshes.items():
+        if settings.target == "lightmap":
+            require_layer_room(name, mesh)
+        else:
+            require_colour_room(name, mesh)
 
 
 def _new_or_own_mesh(name, new_meshes):

@@ -15,8 +15,12 @@ MOST_LAYERS = 8
 
 
 def require_layer_room(name, mesh) -> None:
-    """SceneError where the object's mesh cannot take one more UV layer."""
-    if LIGHTMAP_LAYER not in mesh.uv_layers and len(mesh.uv_layers) >= MOST_LAYERS:
+    """SceneError where the object's mesh cannot take one more UV layer of that name."""
+    if LIGHTMAP_LAYER in mesh.uv_layers:
+        return
+    if LIGHTMAP_LAYER in mesh.attributes:
+        raise SceneError(f"'{name}' has an attribute '{LIGHTMAP_LAYER}' that is no UV map: rename it to bake")
+    if len(mesh.uv_layers) >= MOST_LAYERS:
         raise SceneError(f"'{name}' already has {MOST_LAYERS} UV maps: remove one to make room for '{LIGHTMAP_LAYER}'")
 
 

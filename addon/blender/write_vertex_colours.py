@@ -5,7 +5,19 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ..core.scene import SceneError
 from .read_mesh import BAKED_COLOURS
+
+COLOURS = {"FLOAT_COLOR", "BYTE_COLOR"}
+
+
+def require_colour_room(name, mesh) -> None:
+    """SceneError where something else has the name that the object's colours would get."""
+    found = mesh.attributes.get(BAKED_COLOURS)
+    if found is not None and found.data_type not in COLOURS:
+        raise SceneError(f"'{name}' has an attribute '{BAKED_COLOURS}' that is no colour: rename it to bake")
+    if BAKED_COLOURS in bpy.data.objects[(name, None)].vertex_groups:
+        raise SceneError(f"'{name}' has a vertex group '{BAKED_COLOURS}', as its colours are called: rename it to bake")
 
 
 def write_vertex_colours(targets, corner_colours) -> None:

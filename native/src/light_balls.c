@@ -18,7 +18,7 @@ static void describe_ball(const pl_lights *lights, size_t light, pl_light_balls 
         const area_light lamp = area_of(p);
         io_balls->radius[light] = vec3_length(vec3_add(lamp.axis_u, lamp.axis_v));
         /* a narrow beam is concentrated on its axis */
-        io_balls->strength[light] = luminance(p + 3) * area_of_lamp(&lamp) * greater(spread_share(&lamp, 1), 1);
+        io_balls->strength[light] = luminance(p + 3) * area_of_lamp(&lamp) * greater(spread_share(&lamp, 0), 1);
         break;
     }
     case PL_LIGHT_MESH:

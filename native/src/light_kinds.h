@@ -88,7 +88,7 @@ float sun_importance(const float *p, vec3 normal);
 bool sample_sun(const float *p, vec3 normal, float x, float y, pl_light_sample *out);
 
 /* area_light.c */
-float spread_share(const area_light *light, float cosine);
+float spread_share(const area_light *light, float tangent);
 bool area_faces(const area_light *light, vec3 point);
 bool area_is_exact(const area_light *light);
 float area_of_lamp(const area_light *light);

@@ -242,6 +242,25 @@ def test_eight_uv_maps_are_named_before_the_bake(add_cube):
     assert prepared_for(LIGHTMAP).targets
 
 
+def test_a_name_that_something_else_has_is_told_before_the_bake(add_cube):
+    cube = add_cube("Cube")
+    cube.data.color_attributes.new("Lightmap", "BYTE_COLOR", "CORNER")
+    with pytest.raises(SceneError, match="'Cube' has an attribute 'Lightmap' that is no UV map"):
+        prepared_for(LIGHTMAP)
+    cube.data.uv_layers.new(name="Patchlight")
+    with pytest.raises(SceneError, match="'Cube' has an attribute 'Patchlight' that is no colour"):
+        prepared_for(VERTEX)
+    cube.data.uv_layers.remove(cube.data.uv_layers["Patchlight"])
+    cube.vertex_groups.new(name="Patchlight")
+    with pytest.raises(SceneError, match="'Cube' has a vertex group 'Patchlight'"):
+        prepared_for(VERTEX)
+    cube.vertex_groups.clear()
+    cube.data.color_attributes.new("Patchlight", "BYTE_COLOR", "POINT")
+    prepared = prepared_for(VERTEX)
+    write(prepared, result_for(prepared))
+    assert cube.data.attributes["Patchlight"].data_type == "FLOAT_COLOR"
+
+
 def test_preparing_changes_nothing(add_cube, add_lamp):
     add_cube()
     add_lamp("POINT")

@@ -133,6 +133,22 @@ def test_a_spot_is_full_inside_none_outside_and_smoothstep_between():
     assert (values[angles > np.radians(40)] == 0).all()
 
 
+@pytest.mark.parametrize("is_ellipse", [False, True])
+@pytest.mark.parametrize("spread", [0.0, 0.02, 0.3])
+def test_a_narrow_beam_has_all_of_its_light(spread, is_ellipse):
+    """pi L in its midst, where a point sees all directions of it, and the flux pi L A on the floor; slanted axes."""
+    lamp = AreaLight("lamp", (0.1, 0, 0.5), (0, 0.5, 0), (0.4, 0.1, 0), tuple(COLOUR), is_ellipse, spread)
+    values, _ = direct_light([lamp], [(0.1, 0, 0)], samples=1024)
+    # a thousand points of a Sobol sequence on a cone's smooth hill
+    assert values[0] == pytest.approx(np.pi * COLOUR, rel=0.01)
+    rows = midpoints(-1, 1, 120)
+    points = np.stack([*(axis.ravel() for axis in np.meshgrid(rows, rows)), np.zeros(120**2)], axis=1)
+    values, _ = direct_light([lamp], points, samples=64)
+    area = 4 * 0.5 * 0.4 * (np.pi / 4 if is_ellipse else 1)
+    # squares of 17 mm over the beam's edge, of which there are some 200
+    assert values.mean(axis=0) * 4 == pytest.approx(np.pi * area * COLOUR, rel=0.01)
+
+
 @pytest.mark.parametrize("degrees", [0, 30, 75, 100])
 @pytest.mark.parametrize("angle", [0.0, 0.01])
 def test_a_sun_gives_its_irradiance_times_the_cosine(degrees, angle, points):
