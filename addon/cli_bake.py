@@ -92,6 +92,8 @@ def run_bake(args: argparse.Namespace) -> None:
     if args.exr and args.target != "lightmap":
         raise CommandError("--exr writes the lightmap: it needs --target lightmap")
     output = args.output or args.input.with_name(f"{args.input.stem}_baked.blend")
+    if args.report and args.report.resolve() in (args.input.resolve(), output.resolve()):
+        raise CommandError(f"--report {args.report} is the scene's own file: the report needs another")
     seconds: dict[str, float] = {}
     with with_blender() as bpy, ProgressBar() as progress:
         from .blender import bake_scene, files

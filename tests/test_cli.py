@@ -243,6 +243,19 @@ def test_a_bake_that_fails_after_opening_keeps_an_older_result(room_blend, capsy
     assert older.read_bytes() == b"older"
 
 
+@pytest.mark.parametrize("name", ["room.blend", "room_baked.blend"])
+def test_the_report_is_no_scene(name, room_blend, capsys):
+    before = contents(room_blend.parent)
+    fails_with_one_line(capsys, ["bake", room_blend, "--report", room_blend.with_name(name)], "--report", name)
+    assert contents(room_blend.parent) == before
+
+
+@pytest.mark.skipif(not Path("/dev/null").exists(), reason="a device of Unix")
+def test_a_device_is_no_file_to_save_as(room_blend, capsys):
+    fails_with_one_line(capsys, ["bake", room_blend, "--output", "/dev/null"], "/dev/null", "device")
+    assert Path("/dev/null").is_char_device()
+
+
 def test_what_stands_where_the_exr_should_go_is_told_before_the_bake(room_blend, capsys):
     folder = room_blend.with_name("exr")
     folder.write_bytes(b"a file")

@@ -38,6 +38,8 @@ def require_writable(path) -> None:
     path = Path(path)
     if path.is_dir():
         raise FileError(f"{path}: is a folder, not a file")
+    if path.exists() and not path.is_file():
+        raise FileError(f"{path}: is a device, not a file")
     folder = path.resolve().parent
     if not folder.is_dir():
         raise FileError(f"{folder}: there is no such folder")

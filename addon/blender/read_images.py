@@ -23,9 +23,10 @@ class Images:
         self._textures = {}
         self._warn = warn
 
-    def texture(self, image) -> Texture:
-        """The image as linear Rec.709 pixels; Unreadable where it has none."""
-        return self._read_once(image, "colour", lambda: linear_pixels(image, self._warn))
+    def texture(self, image, is_by_alpha: bool) -> Texture:
+        """The image as linear Rec.709 pixels, those of linear_pixels; Unreadable where it has none."""
+        what = "colour by alpha" if is_by_alpha else "colour"
+        return self._read_once(image, what, lambda: linear_pixels(image, is_by_alpha, self._warn))
 
     def alpha(self, image) -> Texture:
         """The image's alpha as a grey."""
@@ -70,9 +71,20 @@ class Images:
         return self._textures[key]
 
 
-def linear_pixels(image, warn) -> np.ndarray:
-    """Pixels as float32 (height, width, 3), linear Rec.709, row 0 at the bottom; alpha is ignored."""
-    pixels = _rgb(_stored_pixels(image, warn))
+def linear_pixels(image, is_by_alpha: bool, warn) -> np.ndarray:
+    """Pixels as float32 (height, width, 3), linear Rec.709, row 0 at the bottom.
+
+    Cycles gives colours times alpha, black where nothing is, but where the node's Alpha is linked, too. Bytes it
+    multiplies as they are stored; floats are stored as products.
+    """
+    stored = _stored_pixels(image, warn)
+    pixels = _rgb(stored)
+    if _has_alpha(image, stored):
+        alpha = stored[..., 3:4]
+        if is_by_alpha and not image.is_float:
+            pixels = pixels * alpha
+        elif not is_by_alpha and image.is_float:
+            pixels = pixels / np.where(alpha > 0, alpha, np.float32(1))
     if not image.is_float:
         space = image.colorspace_settings.name
         if space not in LINEAR_SPACES:
@@ -88,6 +100,12 @@ def alpha_pixels(image, warn) -> np.ndarray:
     alpha = pixels[..., 3:4] if pixels.shape[2] == 4 and image.alpha_mode != "NONE" else np.ones_like(pixels[..., :1])
     alpha = shrunk(np.clip(np.nan_to_num(alpha), 0.0, 1.0), LONGEST_SIDE)
     return np.repeat(alpha, 3, axis=2)
+
+
+def _has_alpha(image, stored):
+    """Whether colours go by it: not those of data, nor where it is something else beside them."""
+    is_data = image.colorspace_settings.is_data
+    return stored.shape[2] == 4 and not is_data and image.alpha_mode in {"STRAIGHT", "PREMUL"}
 
 
 def mean_colour(pixels) -> tuple[float, float, float]:

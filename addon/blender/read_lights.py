@@ -29,7 +29,10 @@ def read_lights(depsgraph, visibility, warn) -> tuple:
     for instance in _shown(depsgraph, visibility):
         lamp, name = instance.object.data, instance.object.name
         factor = factors[lamp.original.name_full]
-        power = np.maximum(_power(lamp) * factor.colour, 0.0)
+        power = _power(lamp) * factor.colour
+        if min(power) < 0:
+            warn(f"light '{name}' is below 0: none is taken")
+        power = np.maximum(power, 0.0)
         if max(power) <= 0:
             continue
         warn_of_linking(instance.object, warn)
@@ -44,11 +47,11 @@ def read_lights(depsgraph, visibility, warn) -> tuple:
 
 
 def _shown(depsgraph, visibility):
-    """Entries of lamps that have power, whatever their nodes say, and that diffuse surfaces see in a render."""
+    """Entries of lamps that have power, or take some, whatever their nodes say, and that diffuse surfaces see."""
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and visibility.shows(instance) and seen_by(instance)[1]:
             lamp = instance.object.data
-            if not _is_portal(lamp) and max(_power(lamp)) > 0:
+            if not _is_portal(lamp) and _power(lamp).any():
                 yield instance
 
 

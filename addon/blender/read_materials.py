@@ -28,7 +28,7 @@ from .shader_nodes import (
     surface_shader,
 )
 from .surfaces import Colour, Surface, pointwise, weighted_sum
-from .texture_coordinates import Coordinates, read_coordinates
+from .texture_coordinates import Coordinates, read_coordinates, with_own_mapping
 from .two_sides import as_shadow_rays_see, two_sided
 from .view_nodes import mean_over_view
 
@@ -126,6 +126,10 @@ class MaterialReading:
         if max(reflectance.largest, translucence.largest) > 1.01:
             self.say("it reflects one colour and passes another: some of what it reflects is lost")
         reflectance, translucence = reflectance.within(1.0), translucence.within(1.0)
+        if min(surface.radiance.value) < 0:
+            self.say("its emission is below 0: none is taken")
+        if not getattr(self.blender_material, "use_transparent_shadow", True) and surface.transmittance.largest > 0:
+            self.say("lamps shine through it although its Transparent Shadows are off")
         radiance, transmittance = surface.radiance.within(BRIGHTEST), surface.transmittance.within(1.0)
         return Material(
             self.blender_material.name,
@@ -311,6 +315,8 @@ class MaterialReading:
 
     def readable_colour(self, reached) -> Colour:
         """The colour that is reached; Unreadable where it, or a node that makes it, is not known."""
+        if reached.is_constant:
+            return Colour(constant_colour(reached))
         key = (reached.socket.as_pointer(), *(group.as_pointer() for group in reached.groups))
         if key not in self._read:
             outer, self._notes = self._notes, Notes()
@@ -327,7 +333,7 @@ class MaterialReading:
         return found
 
     def _read_colour(self, reached) -> Colour:
-        if reached.is_constant or reached.node.type in {"RGB", "VALUE"}:
+        if reached.node.type in {"RGB", "VALUE"}:
             return Colour(constant_colour(reached))
         if reached.node.type == "LIGHT_PATH" and reached.socket.name in KINDS_OF_RAYS:
             self._notes.asked.add("shadow rays")
@@ -360,12 +366,15 @@ class MaterialReading:
     def _image_colour(self, reached) -> Colour:
         if reached.node.image is None:
             raise Unreadable("Image Texture node without an image")
-        read = self._images.alpha if reached.socket.identifier == "Alpha" else self._images.texture
-        texture, node = read(reached.node.image), reached.node
+        node = reached.node
+        if reached.socket.identifier == "Alpha":
+            texture = self._images.alpha(node.image)
+        else:
+            texture = self._images.texture(node.image, is_by_alpha=not node.outputs["Alpha"].is_linked)
         try:
             if node.projection != "FLAT":
                 raise Unreadable(f"{node.projection.lower()} projection")
-            coordinates = read_coordinates(follow(node.inputs["Vector"], reached.groups))
+            coordinates = with_own_mapping(read_coordinates(follow(node.inputs["Vector"], reached.groups)), node)
         except Unreadable as error:
             self.say(f"its image '{node.image.name}' uses {error}: the image's mean colour is used")
             return Colour(np.array(mean_colour(texture.pixels)))

@@ -10,7 +10,7 @@ from ..core.scene import BRIGHTEST
 from .private_render import RenderError
 from .read_images import linear_pixels
 from .render_world import rendered_world
-from .shader_nodes import Unreadable, constant, constant_colour, constant_vector, surface_shader
+from .shader_nodes import Unreadable, constant, constant_colour, constant_vector, own_mapping, surface_shader
 
 BLACK = (0.0, 0.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
@@ -60,7 +60,9 @@ def _colour(reached, warn):
     if node.image is None or node.projection != "EQUIRECTANGULAR":
         raise Unreadable(f"{node.bl_label} node")
     turn = _turn(reached.feeding("Vector"))
-    return WHITE, Environment(node.image.name, linear_pixels(node.image, warn), turn)
+    if own_mapping(node) is not None:
+        raise Unreadable("Texture Mapping")
+    return WHITE, Environment(node.image.name, linear_pixels(node.image, True, warn), turn)
 
 
 def _turn(vector):

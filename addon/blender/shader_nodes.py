@@ -16,6 +16,16 @@ class Unreadable(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
+class Nothing:
+    """Stands for an input that nothing feeds, not even a number of its own."""
+
+    default_value: tuple = (0.0, 0.0, 0.0)
+
+
+NOTHING = Nothing()
+
+
+@dataclass(frozen=True, slots=True)
 class Reached:
     """What feeds an input: the output ``socket`` of ``node``, or the unlinked input ``socket`` itself (node None).
 
@@ -37,11 +47,14 @@ class Reached:
 
 def follow(socket, groups=()) -> Reached:
     """Walk from an input back to the node that feeds it."""
+    is_passed = False
     while True:
         link = live_link(socket)
         if link is None:
-            return Reached(socket, None, groups)
+            # what a muted node or a reroute lets through is what is linked to it: its own numbers Cycles never has
+            return Reached(NOTHING if is_passed and socket.type != "SHADER" else socket, None, groups)
         node = link.from_node
+        is_passed = node.mute or node.type == "REROUTE"
         if node.mute:
             socket = _passed_through(link)
         elif node.type == "REROUTE":
@@ -67,6 +80,19 @@ def output_input(node_tree, name, output_type="OUTPUT_MATERIAL") -> Reached | No
         return None
     reached = follow(output.inputs[name])
     return None if reached.is_constant else reached
+
+
+def own_mapping(node) -> tuple | None:
+    """Location, rotation and scale of an image ``node``'s own Texture Mapping (3, 3), None where it does nothing."""
+    mapping = node.texture_mapping
+    if (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z) != ("X", "Y", "Z") or mapping.mapping != "FLAT":
+        raise Unreadable("a Texture Mapping of swapped axes")
+    if mapping.use_min or mapping.use_max:
+        raise Unreadable("a Texture Mapping with limits")
+    numbers = tuple(mapping.translation), tuple(mapping.rotation), tuple(mapping.scale)
+    if numbers == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)):
+        return None
+    return numbers
 
 
 def constant(reached: Reached) -> float:

@@ -7,7 +7,7 @@ from math import cos, sin
 
 import numpy as np
 
-from .shader_nodes import Reached, Unreadable, constant_vector
+from .shader_nodes import NOTHING, Reached, Unreadable, constant_vector, own_mapping
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 
@@ -41,6 +41,8 @@ class Coordinates:
 def read_coordinates(vector: Reached) -> Coordinates:
     """Where the Vector input of an Image Texture comes from; Unreadable when not from UVs."""
     if vector.is_constant:
+        if vector.socket is NOTHING:
+            raise Unreadable("coordinates of a muted node without a link")
         return Coordinates()
     node = vector.node
     if node.type == "UVMAP":
@@ -55,20 +57,33 @@ def read_coordinates(vector: Reached) -> Coordinates:
     raise Unreadable(f"{node.bl_label} coordinates")
 
 
+def with_own_mapping(coordinates: Coordinates, node) -> Coordinates:
+    """The same with the Texture Mapping of an Image Texture ``node`` after them."""
+    numbers = own_mapping(node)
+    if numbers is None:
+        return coordinates
+    own = _affine(node.texture_mapping.vector_type, *numbers)
+    return Coordinates(coordinates.uv_layer, _after(own, coordinates.affine), coordinates.extends)
+
+
 def _mapping_affine(mapping: Reached):
-    node = mapping.node
-    location, rotation, scale = (constant_vector(mapping, name) for name in ("Location", "Rotation", "Scale"))
+    numbers = (constant_vector(mapping, name) for name in ("Location", "Rotation", "Scale"))
+    return _affine(mapping.node.vector_type, *numbers)
+
+
+def _affine(vector_type, location, rotation, scale):
+    """Of a mapping, as a matrix (2, 3)."""
     if abs(rotation[0]) > 1e-6 or abs(rotation[1]) > 1e-6:
         raise Unreadable("Mapping node that turns out of the UV plane")
     turn = np.array([[cos(rotation[2]), -sin(rotation[2])], [sin(rotation[2]), cos(rotation[2])]])
-    if node.vector_type == "TEXTURE":
+    if vector_type == "TEXTURE":
         if min(abs(scale[0]), abs(scale[1])) == 0:
             raise Unreadable("Mapping node of scale 0")
         linear = np.diag(1 / np.array(scale[:2])) @ turn.T
         return np.column_stack([linear, -linear @ location[:2]])
-    if node.vector_type not in {"POINT", "VECTOR"}:
-        raise Unreadable(f"Mapping node of type {node.vector_type.title()}")
-    shift = location[:2] if node.vector_type == "POINT" else (0.0, 0.0)
+    if vector_type not in {"POINT", "VECTOR"}:
+        raise Unreadable(f"Mapping node of type {vector_type.title()}")
+    shift = location[:2] if vector_type == "POINT" else (0.0, 0.0)
     return np.column_stack([turn @ np.diag(scale[:2]), shift])
 
 

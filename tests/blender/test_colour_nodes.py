@@ -393,12 +393,28 @@ def test_a_number_that_no_image_has_a_part_in_is_read_without_a_word(nodes, plan
 
 def test_what_a_muted_node_lets_through_is_a_number_where_one_is_asked_for(nodes, plane):
     material, tree = nodes()
-    node = tree.new("HueSaturation", Color=(0.5, 0.5, 0.5, 1.0))
-    node.mute = True
+    colour, node = tree.new("RGB"), tree.new("HueSaturation")
+    colour.outputs[0].default_value, node.mute = (0.5, 0.5, 0.5, 1.0), True
+    tree.link(colour, node, 0, "Color")
     tree.show(tree.link(node, tree.new("BsdfPrincipled"), 0, "Alpha"))
     found, warnings = read_with_warnings(plane, material)
     np.testing.assert_allclose(found.transmittance, 0.5, atol=1e-6)  # a mean is rounded so
     assert warnings == ()
+
+
+@pytest.mark.parametrize("kind", ["HueSaturation", "Gamma"])
+def test_a_muted_node_lets_no_number_of_its_own_through(nodes, plane, kind):
+    """Cycles has black there, and so has it behind a reroute that nothing feeds."""
+    material, tree = nodes()
+    node, reroute = tree.new(kind, Color=(0.5, 0.4, 0.3, 1.0)), tree.new("Reroute")
+    node.mute = True
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), 0, "Color"))
+    found, warnings = read_with_warnings(plane, material)
+    assert found.reflectance == (0, 0, 0)
+    tree.show(tree.link(reroute, tree.new("BsdfDiffuse"), 0, "Color"))
+    found, more = read_with_warnings(plane, material)
+    assert found.reflectance == (0, 0, 0)
+    assert warnings == more == ()
 
 
 def test_an_image_that_nobody_looks_at_moves_no_other(nodes, add_image, plane):

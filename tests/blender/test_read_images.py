@@ -30,6 +30,66 @@ def test_srgb_bytes_become_linear_and_data_and_floats_stay(nodes, read_material,
         assert warnings == ()
 
 
+def linear_of(encoded):
+    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
+
+
+@pytest.mark.parametrize("is_linked", [False, True])
+@pytest.mark.parametrize(
+    ("mode", "space"), [("STRAIGHT", "sRGB"), ("CHANNEL_PACKED", "sRGB"), ("STRAIGHT", "Non-Color")]
+)
+def test_a_colour_goes_by_its_alpha_where_that_is_not_linked(nodes, read_material, is_linked, mode, space):
+    """As Cycles has it: bytes are multiplied as they are stored, before they become linear."""
+    image = bpy.data.images.new("Leaf", 2, 1)
+    image.alpha_mode, image.colorspace_settings.name = mode, space  # each makes it anew
+    image.pixels.foreach_set([0.6, 0.4, 0.2, 1.0, 0.6, 0.4, 0.2, 0.4])
+    material, tree = nodes()
+    picture, diffuse = image_node(tree, image), tree.new("BsdfPrincipled", **{"Specular IOR Level": 0.0})
+    tree.link(picture, diffuse, 0, "Base Color")
+    if is_linked:
+        tree.link(picture, diffuse, 1, "Alpha")
+    tree.show(diffuse)
+    found, _ = read_material(material)
+    goes_by_alpha = not is_linked and (mode, space) == ("STRAIGHT", "sRGB")
+    stored = np.array([[0.6, 0.4, 0.2], np.array([0.6, 0.4, 0.2]) * (0.4 if goes_by_alpha else 1)])
+    expected = linear_of(stored) if space == "sRGB" else stored
+    # bytes: half of 1 / 255 each in colour and alpha
+    np.testing.assert_allclose(found.reflectance_texture.pixels[0] * found.reflectance, expected, atol=0.006)
+
+
+def test_floats_that_are_products_are_divided_where_alpha_is_linked(nodes, read_material):
+    image = bpy.data.images.new("Glow", 2, 1, float_buffer=True, alpha=True)
+    image.colorspace_settings.name, image.alpha_mode = "Linear Rec.709", "PREMUL"
+    image.pixels.foreach_set([0.6, 0.4, 0.2, 1.0, 0.15, 0.1, 0.05, 0.25])
+    for is_linked in (False, True):
+        material, tree = nodes(f"{is_linked}")
+        picture, emission = image_node(tree, image), tree.new("Emission")
+        tree.link(picture, emission, 0, "Color")
+        if is_linked:
+            tree.link(picture, emission, 1, "Strength")
+        tree.show(emission)
+        found, _ = read_material(material)
+        # by alpha, or by strength, which is alpha here: the same light
+        seen = found.radiance_texture.pixels[0] * found.radiance
+        np.testing.assert_allclose(seen, [(0.6, 0.4, 0.2), (0.15, 0.1, 0.05)], atol=1e-6)
+
+
+def test_a_texture_mapping_of_the_image_itself_is_read(nodes, read_material, add_image):
+    material, tree = nodes()
+    picture = image_node(tree, add_image(checker()))
+    picture.texture_mapping.translation, picture.texture_mapping.scale = (0.5, 0.25, 0), (2, 3, 1)
+    tree.show(tree.link(picture, tree.new("BsdfDiffuse"), 0, "Color"))
+    read_material(material)
+    scene = read_scene(bpy.context.scene)
+    layer = bpy.data.objects[0].data.uv_layers[0]
+    loops = scene.objects[0].corners
+    own = np.array([each.uv[:] for each in layer.data])[loops]
+    np.testing.assert_allclose(scene.uvs, own * (2, 3) + (0.5, 0.25), atol=1e-6)  # float32
+    picture.texture_mapping.mapping_x = "Y"
+    _, warnings = read_material(material)
+    assert "Texture Mapping" in warnings[0]
+
+
 def test_an_image_that_two_materials_use_is_one_texture(nodes, add_cube, add_image):
     image = add_image(checker())
     for name in "AB":

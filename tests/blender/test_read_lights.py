@@ -115,6 +115,14 @@ def test_a_sun_that_is_not_normalised_is_a_disc_of_that_radiance(add_lamp, read)
     np.testing.assert_allclose(light.irradiance, 1000 * pi * sin(radians(1)) ** 2, rtol=1e-5)  # float32 angle
 
 
+def test_a_lamp_below_zero_is_told(add_lamp, add_cube):
+    add_cube()
+    add_lamp("POINT", "Thief").data.energy = -20
+    scene = read_scene(bpy.context.scene)
+    assert scene.lights == ()
+    assert "light 'Thief' is below 0: none is taken" in scene.warnings
+
+
 def test_hidden_and_dark_lamps_are_left_out_and_instances_counted(add_lamp, read):
     add_lamp("POINT", "Hidden").hide_render = True
     add_lamp("POINT", "Off", energy=0)

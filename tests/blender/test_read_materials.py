@@ -201,6 +201,19 @@ def test_links_go_through_reroutes_groups_and_muted_nodes(nodes, read_material):
     assert warnings == ()
 
 
+def test_what_an_emission_or_a_shadow_is_not_read_as_is_told(nodes, read_material):
+    material, tree = nodes()
+    tree.show(tree.new("Emission", Strength=-2.0))
+    found, warnings = read_material(material)
+    assert found.radiance == (0, 0, 0)
+    assert "its emission is below 0" in warnings[0]
+    glass, tree = nodes("Glass")
+    tree.show(tree.new("BsdfTransparent"))
+    glass.use_transparent_shadow = False
+    _, warnings = read_material(glass)
+    assert "Transparent Shadows" in warnings[0]
+
+
 def test_an_emission_texture_is_scaled_by_the_strength(nodes, read_material, add_image):
     material, tree = nodes()
     tree.show(

@@ -108,6 +108,21 @@ def counts():
     return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
 
 
+def test_a_world_image_with_a_texture_mapping_of_its_own_is_what_cycles_shows(sky_image, read):
+    pixels, _, node = sky_image(strength=0.5)
+    node.texture_mapping.rotation = (0, 0, np.pi / 2)
+    scene = read()
+    assert not scene.warnings
+    before = Environment("Sunset", pixels)
+    rows, columns = (part.ravel() for part in np.mgrid[64:448:37, 0:1024:31])
+    directions = scene.environment.directions(rows, columns)
+    # turned by a right angle about z, as a Mapping node of that rotation turns it
+    x, y, z = directions.T
+    turned = before.seen(np.stack([-y, x, z], axis=1)) / 2
+    found = scene.environment.seen(directions) * np.array(scene.world_radiance)
+    assert np.median(np.abs(found - turned)) < 0.01 * turned.mean()
+
+
 def test_a_world_that_cannot_be_read_is_rendered_and_the_file_stays_as_it_is(sky_image, read):
     """A sky by way of coordinates that no Mapping node gives is what it is by its image."""
     pixels, tree, node = sky_image(strength=0.5)
