@@ -23,6 +23,7 @@ from .workers import within
 
 LEAST_FIRST, MOST_FIRST = 2, 8  # rays of a replicate in the first pass; few may miss what is bright and small, and
 MANY = 1 << 16  # not know it, but of so many receivers neighbours vouch for each other: fewer begin with the most
+FINE = 3 << 20  # texels or more begin with half as many, as neighbours lie so much nearer: light is no finer for them
 FIRST_ERROR = 0.1  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
 HURRY = 4  # such passes could be had in the time there is, at the least: else all begin with the fewest
 MOST_RAYS = 2048  # of a replicate; a last few that are not WORTH a pass are not taken
@@ -129,10 +130,9 @@ def gather_until(
     """
     count, started = len(job.receivers), time.perf_counter()
     samples, probes = _Samples(count), None
-    fewest = LEAST_FIRST if count >= MANY else MOST_FIRST
-    # fewer neighbours take less off
-    budgeted = fewest if grid.is_image else MOST_FIRST
-    first = first_rays(fewest, error, pace * seconds_left() / (REPLICATES * count))
+    # what the budget goes by: fewer neighbours take less off
+    budgeted = LEAST_FIRST if grid.is_image and count >= MANY else MOST_FIRST
+    first = first_rays(fewest_first(count, grid.is_image), error, pace * seconds_left() / (REPLICATES * count))
     active, further = np.arange(count), np.full(count, first, np.int32)
     aim = VERTEX_AIM if not grid.is_image else AIM if denoise is None else DENOISED_AIM
     budget, idle, begin, rms, is_first = 0, 0, 0.0, np.inf, True
@@ -172,9 +172,17 @@ def gather_until(
         del found, scales  # a fine lightmap's are a gigabyte, which the next estimate needs
 
 
+def fewest_first(count, is_image) -> int:
+    """Rays of a replicate that ``count`` receivers start with at the fewest."""
+    if count < MANY:
+        return MOST_FIRST
+    return LEAST_FIRST // 2 if is_image and count >= FINE else LEAST_FIRST
+
+
 def first_rays(fewest, error, in_time) -> int:
     """Rays of a replicate that all receivers start with, where there is time for ``in_time``."""
-    enough = int(np.clip(2.0 ** round(np.log2(FIRST_ERROR / error)), fewest, MOST_FIRST))
+    usual = FIRST_ERROR / error * min(fewest / LEAST_FIRST, 1)
+    enough = int(np.clip(2.0 ** round(np.log2(usual)), fewest, MOST_FIRST))
     return enough if HURRY * enough <= in_time else fewest
 
 

@@ -8,9 +8,11 @@ from addon.core.passes import (
     AIM,
     DENOISED_AIM,
     ENOUGH,
+    FINE,
     FREE_RAYS,
     HURRY,
     LEAST_FIRST,
+    MANY,
     MOST_FIRST,
     MOST_RAYS,
     SPECKLE_SHARE,
@@ -20,6 +22,7 @@ from addon.core.passes import (
     _gathered_part,
     _next,
     _Samples,
+    fewest_first,
     first_rays,
     ray_budget,
 )
@@ -32,6 +35,14 @@ def test_the_smaller_the_error_the_more_rays_the_first_pass_takes_and_never_fewe
     errors = [1.0, 0.05, 0.02, 0.01, 1e-4]
     assert [first_rays(LEAST_FIRST, error, np.inf) for error in errors] == [2, 2, 4, 8, 8]
     assert [first_rays(MOST_FIRST, error, np.inf) for error in errors] == [8, 8, 8, 8, 8]
+    # a fine lightmap: half as many
+    assert [first_rays(LEAST_FIRST // 2, error, np.inf) for error in errors] == [1, 1, 2, 4, 8]
+
+
+def test_many_receivers_begin_with_fewer_rays_each_and_the_texels_of_a_fine_lightmap_with_half_of_them():
+    assert fewest_first(MANY - 1, True) == fewest_first(MANY - 1, False) == MOST_FIRST
+    assert fewest_first(MANY, True) == fewest_first(FINE, False) == LEAST_FIRST
+    assert fewest_first(FINE, True) == LEAST_FIRST // 2
 
 
 def test_a_time_limit_makes_the_first_pass_shorter_only_where_it_is_near():
