@@ -107,7 +107,7 @@ lint: $(VENV)/.installed
 # A C test is a program of plain asserts, linked with the whole kernel; it finds Embree by the environment.
 $(BUILD)/native/%: tests/native/%.c $(KERNEL_SOURCES) $(KERNEL_HEADERS) $(wildcard tests/native/*.h)
 	@mkdir -p $(@D)
-	$(CC) $(SANITIZE) $(WARNINGS) -Inative/include -Inative/src $(filter %.c,$^) -o $@ -lm -ldl -lpthread
+	$(CC) $(SANITIZE) $(WARNINGS) -Inative/include -Inative/src $(filter %.c,$^) -o $@ -lm -ldl
 
 # Leaks are not looked for: Embree and TBB keep their thread pools until the process ends.
 native-tests: $(C_TESTS) | $(VENV)/.installed
@@ -124,7 +124,7 @@ $(SANITIZED): $(KERNEL_SOURCES) $(DOOR_SOURCES) $(KERNEL_HEADERS) | $(VENV)/.ins
 	@mkdir -p $(@D)
 	$(CC) $(SANITIZE) -fsanitize=float-cast-overflow -fPIC -shared -fvisibility=hidden -DPy_LIMITED_API=0x030B0000 \
 	    -Inative/include -Inative/src -isystem $$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("include"))') \
-	    $(KERNEL_SOURCES) $(DOOR_SOURCES) -o $@ -lm -ldl -lpthread
+	    $(KERNEL_SOURCES) $(DOOR_SOURCES) -o $@ -lm -ldl
 
 # Python itself is not built for it, so the sanitizer's library comes first by hand, and C++'s next, or what matplotlib
 # throws is not caught; Python frees nothing at its end.

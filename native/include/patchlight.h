@@ -11,8 +11,8 @@
  *     counter-clockwise, side 1 the back; patch p's unknowns are 2 p and 2 p + 1
  *   a function that can fail returns pl_status; outputs are the last parameters
  *   the caller owns every array; what a `create` is given is copied; `destroy(NULL)` is legal
- *   nothing here starts a thread or keeps global state: callers run disjoint ranges of one job in as
- *     many threads as they like, and get the same bytes for every number of threads
+ *   nothing here keeps global state or starts a thread, but for Embree's own, which build the tree of a scene: callers
+ *     run disjoint ranges of one job in as many threads as they like, and get the same bytes for every number of them
  */
 #ifndef PATCHLIGHT_H
 #define PATCHLIGHT_H
@@ -168,7 +168,7 @@ pl_status pl_patch_points(const pl_patches *patches, const int32_t *selected, si
  *
  *   sides      count of them: 2 * patch + side
  *   rays       per side, at least 1
- *   resolution pixels along the top face, even, at least 2: 3 * resolution^2 rays per position
+ *   resolution pixels along the top face, even, 2 .. 16384: 3 * resolution^2 rays per position
  *   out_rows   count * 2 * patch_count doubles: millions of small shares must sum to 1
  */
 pl_status pl_form_factors_monte_carlo(const pl_scene *scene, const pl_patches *patches, const int32_t *sides,
@@ -351,7 +351,7 @@ pl_status pl_learn_guides(const pl_gather_scene *in, const pl_receivers *receive
  *
  *   guides         where rays are drawn from
  *   selected       count indices into the receivers; a receiver's rays hang on its index only
- *   replicates     independent randomisations, 1..PL_MAX_REPLICATES; their spread is the error estimate
+ *   replicates     independent randomisations; their spread is the error estimate
  *   first, count   rays of each replicate, after the first ones that it already has. One scrambled Sobol sequence goes
  *                  through all receivers, count points each: receivers that follow each other share its even spread,
  *                  so that their mean is better than any of them (Ahmed & Wonka 2020, sec. 4)
@@ -359,7 +359,6 @@ pl_status pl_learn_guides(const pl_gather_scene *in, const pl_receivers *receive
  *   io_luminances  replicates per selected receiver's index: the sum of its luminance over those of each, added to
  *   out_rays       all rays traced, shadow rays and those that went on included
  */
-enum { PL_MAX_REPLICATES = 8 };
 typedef struct pl_gather_rays {
     uint32_t replicates;
     uint32_t first;

@@ -157,8 +157,13 @@ PyObject *door_learn_guides(PyObject *self, PyObject *args) {
     gather_view in;
     view_gather(arrays, scene, patches, width, reach, &in);
     const uint32_t *starts = arrays[FIRST_MEMBERS].view.buf;
-    bool fits = first >= 0 && count >= 0 && (size_t)(first + count) <= door_rows(&arrays[MOMENTS]) &&
-                (size_t)(first + count) < door_rows(&arrays[FIRST_MEMBERS]);
+    const size_t groups = door_rows(&arrays[FIRST_MEMBERS]) ? door_rows(&arrays[FIRST_MEMBERS]) - 1 : 0;
+    if (!door_range_fits((uint64_t)first, (uint64_t)count,
+                         groups < door_rows(&arrays[MOMENTS]) ? groups : door_rows(&arrays[MOMENTS]))) {
+        door_release(arrays, ARRAYS);
+        return NULL;
+    }
+    bool fits = true;
     for (Py_ssize_t group = first; fits && group < first + count; ++group)
         fits = starts[group] <= starts[group + 1] && starts[group + 1] <= door_rows(&arrays[MEMBERS]);
 
@@ -195,6 +200,10 @@ PyObject *door_direct(PyObject *self, PyObject *args) {
         return NULL;
     const pl_lights lights = lights_of(arrays);
     const pl_receivers receivers = receivers_of(arrays + RECEIVERS);
+    if (!door_range_fits((uint64_t)first, (uint64_t)count, receivers.count)) {
+        door_release(arrays, ARRAYS);
+        return NULL;
+    }
 
     Py_BEGIN_ALLOW_THREADS
     status = pl_direct(scene, &lights, &receivers, (size_t)first, (size_t)count, samples, is_first, seed,

@@ -21,7 +21,12 @@ static PyObject *open_embree(PyObject *self, PyObject *args) {
     if (!PyArg_ParseTuple(args, "s", &path))
         return NULL;
     const pl_status status = pl_embree_open(path, &embree);
-    return status == PL_OK ? PyCapsule_New(embree, EMBREE, destroy_embree) : door_result(status);
+    if (status != PL_OK)
+        return door_result(status);
+    PyObject *capsule = PyCapsule_New(embree, EMBREE, destroy_embree);
+    if (!capsule)
+        pl_embree_close(embree);
+    return capsule;
 }
 
 static PyObject *create_scene(PyObject *self, PyObject *args) {
@@ -63,6 +68,8 @@ static PyObject *create_scene(PyObject *self, PyObject *args) {
     PyObject *capsule = PyCapsule_New(scene, SCENE, destroy_scene);
     if (capsule)
         PyCapsule_SetContext(capsule, Py_NewRef(parent));
+    else
+        pl_scene_destroy(scene);
     return capsule;
 }
 
@@ -191,10 +198,12 @@ static PyMethodDef methods[] = {
      "shoot(scene, patches, sides, first_samples, ray_flux, first_rays, first, count, seed, io_received, "
      "io_escaped)"},
     {"gather", door_gather, METH_VARARGS,
-     "gather(scene, patches, solution, lights, receivers, guides, selected, replicates, first, count, seed, "
+     "gather(scene, patches, solution, (uvs, texels, width, reach), lights, receivers, guides, selected, replicates, "
+     "first, count, seed, "
      "(io_light, io_luminances)) -> rays"},
     {"learn_guides", door_learn_guides, METH_VARARGS,
-     "learn_guides(scene, patches, solution, lights, receivers, members, first_members, first, count, rays, seed, "
+     "learn_guides(scene, patches, solution, (uvs, texels, width, reach), lights, receivers, members, first_members, "
+     "first, count, rays, seed, "
      "out_moments) -> rays"},
     {"direct", door_direct, METH_VARARGS,
      "direct(scene, lights, receivers, first, count, samples, is_first, seed, out_irradiance, out_variance) -> rays"},

@@ -37,7 +37,12 @@ PyObject *door_create_patches(PyObject *self, PyObject *args) {
         status = pl_patches_create(&layout, &patches);
     }
     door_release(arrays, 6);
-    return status == PL_OK ? PyCapsule_New(patches, PATCHES, destroy_patches) : door_result(status);
+    if (status != PL_OK)
+        return door_result(status);
+    PyObject *capsule = PyCapsule_New(patches, PATCHES, destroy_patches);
+    if (!capsule)
+        pl_patches_destroy(patches);
+    return capsule;
 }
 
 PyObject *door_patch_points(PyObject *self, PyObject *args) {

@@ -21,7 +21,7 @@ pl_hit hit_at_edge(const pl_scene *scene, vec3 origin, vec3 direction, float nea
     double nearest = exact_distance(scene, hit.triangle, origin, direction);
     /* rays beside it find the others that meet there: as far off as rounding cannot bridge, 2^-20 of all coordinates */
     const float length = vec3_length(direction);
-    const float off = 9.5367431640625e-7f * greater(length, scene->reach / greater(hit.distance, 1e-30f));
+    const float off = eight_ulps * greater(length, scene->reach / greater(hit.distance, 1e-30f));
     vec3 u, v;
     vec3_basis(vec3_unit(direction), &u, &v);
     for (int side = 0; side < 4; ++side) {

@@ -107,7 +107,8 @@ static void hemicube_at(const pl_scene *scene, const pl_patches *patches, const 
 pl_status pl_form_factors_hemicube(const pl_scene *scene, const pl_patches *patches, const int32_t *sides, size_t count,
                                    uint32_t resolution, uint32_t positions, uint32_t seed, double *out_rows) {
     const size_t side_count = 2 * patches->patch_count;
-    if (resolution < 2 || resolution % 2 || positions == 0 || !sides_are_in_range(patches, sides, count))
+    if (resolution < 2 || resolution % 2 || resolution > 1 << 14 || positions == 0 ||
+        !sides_are_in_range(patches, sides, count))
         return PL_ERR_ARGUMENT;
     memset(out_rows, 0, sizeof(double) * side_count * count);
     for (size_t i = 0; i < count; ++i) {

@@ -77,9 +77,7 @@ static inline void scaled(const float rgb[3], float factor, float out_rgb[3]) {
 static const float far_of_face = 0.999999f;
 
 /* Eight units in the last place of a point's largest coordinate, as in point_off_triangle. */
-static inline float rounding_of(vec3 p) {
-    return 9.5367431640625e-7f * greater(fabsf(p.x), greater(fabsf(p.y), fabsf(p.z)));
-}
+static inline float rounding_of(vec3 p) { return eight_ulps * greater(fabsf(p.x), greater(fabsf(p.y), fabsf(p.z))); }
 
 /* point_light.c: `p` are the light's parameters in the table. */
 float point_importance(const point_light *light, vec3 point);

@@ -83,7 +83,7 @@ bool sample_mesh(const pl_lights *lights, const float *p, vec3 point, vec3 norma
     vec3 lamp_normal = vec3_scale(twice_area, 1 / greater(twice, 1e-30f));
     if (vec3_dot(vec3_sub(point, target), lamp_normal) < 0)
         lamp_normal = vec3_scale(lamp_normal, -1);
-    target = vec3_mul_add(lamp_normal, greater(rounding_of(target), 9.5367431640625e-7f * light.radius), target);
+    target = vec3_mul_add(lamp_normal, greater(rounding_of(target), eight_ulps * light.radius), target);
 
     out->direction = vec3_sub(target, point);
     out->far = far_of_face;

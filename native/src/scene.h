@@ -7,7 +7,7 @@
 
 #include <stdbool.h>
 
-/* Triangles that share a BVH, and which of the scene's triangles each is (NULL: the same). */
+/* Triangles that share a BVH, and which of the scene's triangles each is. */
 typedef struct pl_layer {
     RTCScene bvh;
     int32_t *triangles;
@@ -59,7 +59,7 @@ static inline vec3 point_off_triangle(const pl_scene *scene, int32_t triangle, v
         const vec3 p = scene_vertex(scene, triangle, corner);
         largest = greater(largest, greater(fabsf(p.x), greater(fabsf(p.y), fabsf(p.z))));
     }
-    return vec3_mul_add(normal, 9.5367431640625e-7f * largest, point);
+    return vec3_mul_add(normal, eight_ulps * largest, point);
 }
 
 /* The first opaque triangle from `near` on. */

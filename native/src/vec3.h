@@ -10,6 +10,9 @@ static const float PL_PI = 3.14159265358979f;
 static inline float lesser(float value, float bound) { return value < bound ? value : bound; }
 static inline float greater(float value, float bound) { return value > bound ? value : bound; }
 
+/* Eight units in the last place of a number of size 1: what keeps a point off a plane that it was computed in. */
+static const float eight_ulps = 9.5367431640625e-7f;
+
 typedef struct vec3 {
     float x, y, z;
 } vec3;
