@@ -239,12 +239,6 @@ def exchange_matrix(surfaces, blockers=()):
     return exchanges
 
 
-def form_factor_matrix(surfaces, blockers=()):
-    """F[i, j], share of what leaves surface i that lands on j, float64 (N, N)."""
-    areas = np.array([s.area for s in surfaces])
-    return exchange_matrix(surfaces, blockers) / areas[:, None]
-
-
 def element_form_factor(point, normal, target: Surface, blockers=()) -> float:
     """Form factor from an element at ``point`` (3,) with unit ``normal`` (3,) to the part of a surface it sees."""
     total = 0.0

@@ -10,6 +10,7 @@ from . import case_scene as scenes
 from .analytic import Surface, exchanges
 from .bodies import Body, sphere
 from .cases import Case, CaseError
+from .polygon import distinct_corners
 from .transport import Estimate
 
 FACTOR = re.compile(r"F\(([^()]*?)->([^()]*?)\)")
@@ -242,7 +243,7 @@ def concentric_matrix(r1: float, r2: float, estimator) -> Estimate:
     panels = np.concatenate([ring.panels for ring in outer.rings])
     shares = []
     for ring in inner.rings:
-        first = Surface("inner", (_distinct(ring.panels[0]),))
+        first = Surface("inner", (distinct_corners(ring.panels[0]),))
         shares.append(_to_all(first, panels, estimator))
     weights = np.array([ring.area for ring in inner.rings]) / inner.area
     there = combine(shares, weights)
@@ -254,12 +255,8 @@ def concentric_matrix(r1: float, r2: float, estimator) -> Estimate:
     return Estimate(*parts)
 
 
-def _distinct(panel):
-    return panel[(panel != np.roll(panel, 1, axis=0)).any(axis=1)]
-
-
 def _to_all(first, panels, estimator):
     if estimator.name != "analytic":
-        return estimator.factor(first, Surface("outer", tuple(_distinct(panel) for panel in panels)))
+        return estimator.factor(first, Surface("outer", tuple(distinct_corners(panel) for panel in panels)))
     value = np.asarray(exchanges(first.pieces[0], panels).sum() / first.area)
     return Estimate(value, np.zeros_like(value), 1e-6 * value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from . import case_scene as scenes
-from .bodies import Body, Ring, disk, sphere
+from .bodies import disk, sphere
 from .case_factors import concentric_matrix
 from .case_solutions import pair, solve, solved
 from .cases import Case, CaseError
@@ -47,7 +47,7 @@ def cavity_case(case: Case, estimator) -> Estimate:
     """Sphere without a cap of area fraction f, E = 1 - rho: B of the wall, escaped over emitted power, emissivity."""
     f, rho = case.number("f"), case.number("rho")
     emitted = case.number("E", 1 - rho)
-    wall, opening = _sphere_with_port(1.0, f, 0.0, True)
+    wall, opening = _sphere_with_port(1.0, f)
     found = estimator.body_matrix([wall, opening])
     areas = np.array([wall.area, opening.area])
     radiosity = solve(found.value, np.array([rho, 0.0]), np.array([emitted, 0.0]), areas)
@@ -55,16 +55,12 @@ def cavity_case(case: Case, estimator) -> Estimate:
     return solved([radiosity[0], areas[1] * leaving / (areas[0] * emitted), leaving * (1 - rho) / emitted])
 
 
-def _sphere_with_port(radius, fraction, centre, port_above):
-    """A sphere without a polar cap, and the polygon that closes it, both seen from inside."""
+def _sphere_with_port(radius, fraction):
+    """A sphere without its cap at the top, and the polygon that closes it, both seen from inside."""
     edge = np.arccos(1 - 2 * fraction)
     angles = np.linspace(edge, np.pi, scenes.SPHERE_RINGS + 1)
-    wall = sphere("wall", radius, angles, scenes.SPHERE_SIDES, looks_in=True, centre=centre)
-    port = disk("port", radius * np.sin(edge), centre + radius * np.cos(edge), scenes.SPHERE_SIDES, looks_up=False)
-    if port_above:
-        return wall, port
-    flipped = [Body(b.name, tuple(Ring((r.panels * (1, 1, -1))[:, ::-1]) for r in b.rings)) for b in (wall, port)]
-    return flipped[0], flipped[1]
+    wall = sphere("wall", radius, angles, scenes.SPHERE_SIDES, looks_in=True)
+    return wall, disk("port", radius * np.sin(edge), radius * np.cos(edge), scenes.SPHERE_SIDES, looks_up=False)
 
 
 def port_case(case: Case, estimator) -> Estimate:
@@ -79,7 +75,7 @@ def port_case(case: Case, estimator) -> Estimate:
     system, areas = np.zeros((4, 4)), np.zeros(4)
     reflectance, emission = np.ones(4), np.zeros(4)
     for k in range(2):
-        bodies = _sphere_with_port(radii[k], f[k], 0.0, True)
+        bodies = _sphere_with_port(radii[k], f[k])
         found = estimator.body_matrix(list(bodies)).value
         wall, port, behind = 2 * k, 2 * k + 1, 2 * (1 - k) + 1
         areas[[wall, port]] = [body.area for body in bodies]

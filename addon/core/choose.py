@@ -66,7 +66,7 @@ def _choose_rays(settings, material):
 
 
 def mean_reflectance(scene: Scene) -> float:
-    """Mean over the scene's area of the brightest channel; textures, not read yet, count as grey."""
+    """Mean over the scene's area of the brightest channel; textures count as grey."""
     brightest = [max(m.reflectance) * (0.5 if m.reflectance_texture is not None else 1.0) for m in scene.materials]
     areas = triangle_areas(scene.corners)
     return float((areas * np.array(brightest)[scene.triangle_materials]).sum() / max(areas.sum(), 1e-300))

@@ -18,7 +18,8 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 MOST_GROUPS = 96  # groups of glowing triangles: each receiver weighs every group
 GROUP_TRIANGLES = 8  # a group of no more has a closed form in the kernel
-TEXTURE_CUTS = 8  # a triangle whose glow is an image is cut into so many squared, each with the mean of
+TEXTURE_CUTS = 8  # a triangle whose glow is an image is cut into so many squared,
+MOST_PIECES = 1 << 20  # all of them into no more, about, each with the mean of
 MOST_FINER, TEXTURE_LOOKUPS = 8, 1 << 22  # at the most so many points, squared, and of all of them so many
 
 
@@ -122,7 +123,7 @@ def _glowing_triangles(scene):
     # at one place of its image a triangle has one colour
     cut = cut[(scene.uvs[cut] != scene.uvs[cut, :1]).any(axis=(1, 2))]
     plain = np.setdiff1d(np.flatnonzero(emits[scene.triangle_materials]), cut, assume_unique=True)
-    weights = _cuts(TEXTURE_CUTS)
+    weights = _cuts(int(np.clip((MOST_PIECES / max(len(cut), 1)) ** 0.5, 1, TEXTURE_CUTS)))
 
     pieces = np.einsum("pkb,tbc->tpkc", weights, scene.corners[cut]).reshape(-1, 3, 3)
     middles = np.full((len(plain), 3), 1 / 3, np.float32)

@@ -10,8 +10,6 @@ from .sampled import SampledEstimator
 from .transport import Estimate
 from .workers import Workers
 
-METHODS = ("analytic", "hemicube", "monte-carlo")
-
 
 class AnalyticEstimator:
     """Float64, deterministic; the error it states is what the integration allows itself."""

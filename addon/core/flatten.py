@@ -17,7 +17,7 @@ LEAST_FACING = 0.2  # cosine between a triangle and the plane that its chart is 
 LEAST_SCALE = 0.2  # of lengths, geometric mean in a triangle; a fold counts as negative
 LARGEST_SCALE = 5.0
 SPECK = 1e-6  # of the whole surface: a texel in a lightmap of a million
-SAME_UV = 1e-6  # of the chart's size: two corners of one loop so close together have one UV
+SAME_UV = 1e-6  # of the extent of all charts: two corners of one loop so close together have one UV
 TURNS = 24  # angles that a chart is tried at, within a quarter turn
 EDGES = ((0, 1), (1, 2), (2, 0))
 

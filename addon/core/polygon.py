@@ -72,7 +72,7 @@ def is_convex(corners) -> bool:
 
 def convex_pieces(corners) -> list[np.ndarray]:
     """Convex pieces that make up a polygon (K, 3): itself where it is convex and planar, else few, or triangles."""
-    corners = without_repeats(corners)
+    corners = distinct_corners(corners)
     if not is_planar(corners):
         return triangulate(corners)
     return [corners] if is_convex(corners) else merged(triangulate(corners))
@@ -100,12 +100,6 @@ def _joined(first, second):
                 rest = np.roll(second, -m - 2, axis=0)[: len(second) - 2]
                 return np.concatenate([first[: k + 1], rest, first[k + 1 :]])
     return None
-
-
-def without_repeats(corners):
-    """The polygon without corners that follow themselves."""
-    kept = (corners != np.roll(corners, 1, axis=0)).any(axis=1)
-    return corners[kept]
 
 
 def triangulate(corners) -> list[np.ndarray]:

@@ -31,7 +31,7 @@ class Report:
     rays : by stage
     patches, receivers : counts; a patch has two sides, an unknown each
     method, solver : what ran, after "auto" has chosen; ``choice`` says why
-    residuals : the solver's residual after each step, relative to the first
+    residuals : the solver's residual after each step, relative to the emitted flux
     denoiser : what took noise away in the end, with its version, or "none" and why
     estimated_error : local relative RMS error of the irradiance at the receivers, which more rays make smaller; of a
         lightmap's each by how much of the surface looks it up
@@ -70,10 +70,6 @@ class Report:
         stages = {**self.seconds, **seconds}
         stages["bake"] = sum(stages.get(stage, 0.0) for stage in STAGES_OF_A_BAKE)
         return replace(self, seconds=stages)
-
-    def with_warnings(self, warnings: tuple[str, ...]) -> Report:
-        """A copy with further warnings."""
-        return replace(self, warnings=(*self.warnings, *warnings))
 
     def as_dict(self) -> dict:
         """Plain numbers, strings, lists and dicts."""

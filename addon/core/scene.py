@@ -21,8 +21,7 @@ from .ranges import (
     require_vector,
 )
 
-# pi stands in these two functions and nowhere else in the package's Python: a Lambertian surface of
-# radiance L sends out M = pi L [W/m^2].
+# Between radiances and exitances only these two go: a Lambertian surface of radiance L sends out M = pi L [W/m^2].
 
 
 def exitance_from_radiance(radiance):

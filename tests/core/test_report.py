@@ -27,11 +27,6 @@ def test_a_bake_costs_what_its_stages_cost():
     assert "bake" not in report.seconds
 
 
-def test_warnings_are_added_after_those_there_are():
-    report = Report(warnings=("one",)).with_warnings(("two", "three"))
-    assert report.warnings == ("one", "two", "three")
-
-
 def test_a_report_does_not_change():
     with pytest.raises(dataclasses.FrozenInstanceError):
         Report().patches = 3

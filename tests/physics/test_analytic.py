@@ -8,12 +8,12 @@ from addon.core.analytic import (
     element_form_factor,
     exchange,
     exchange_matrix,
-    form_factor_matrix,
     surface,
     surface_exchange,
 )
 from addon.core.bodies import body_exchanges, cylinder, disk, equal_area_radius, ring_exchanges, sphere
 from addon.core.case_scene import box, l_room, tetrahedron
+from addon.core.estimators import AnalyticEstimator
 from addon.core.polygon import polygon_area
 from tests.reference import closed_forms as howell
 from tests.reference.exchange import exchange as by_definition
@@ -137,12 +137,12 @@ def test_points_against_the_slow_formula():
 
 @pytest.mark.parametrize("room", [box((0, 0, 0), (1, 1, 1)), box((0, 0, 0), (4, 3, 2.5)), tetrahedron()])
 def test_a_convex_room_takes_all_light(room):
-    factors = form_factor_matrix(room)
+    factors = AnalyticEstimator().matrix(room).value
     assert factors.sum(axis=1) == pytest.approx(np.ones(len(room)), abs=1e-12)
 
 
 def test_a_room_with_a_corner_in_the_way_takes_all_light():
-    factors = form_factor_matrix(l_room())
+    factors = AnalyticEstimator().matrix(l_room()).value
     # hidden parts are integrated to 1e-6 of each pair
     assert factors.sum(axis=1) == pytest.approx(np.ones(8), abs=3e-6)
 
