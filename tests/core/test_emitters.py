@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.emitters import AREA, LIGHT_FLOATS, MESH, MOST_GROUPS, POINT, SUN, emitters_of
+from addon.core.emitters import AREA, LIGHT_FLOATS, MESH, MOST_GROUPS, POINT, SUN, TEXTURE_CUTS, emitters_of
 from addon.core.scene import AreaLight, Material, PointLight, SunLight, Texture
 from tests.scenes import BLACK, cornell_box, lamp, rectangle, scene_of
 
@@ -78,6 +78,20 @@ def test_a_glow_that_is_a_fine_image_keeps_its_light():
     scene.uvs[:] = scene.corners[..., :2]
     # 64 points of a piece for 32 pixels: what interpolation between these leaves
     assert flux(emitters_of(scene, (0, 0, 0))) == pytest.approx(2 * pixels.mean(axis=(0, 1)), rel=0.01)
+
+
+def test_many_triangles_that_glow_by_an_image_are_cut_into_fewer_pieces_each(monkeypatch):
+    pixels = np.random.default_rng(0).uniform(0, 1, (8, 8, 3)).astype(np.float32)
+    glow = Material("picture", (0, 0, 0), radiance=(2.0, 2.0, 2.0), radiance_texture=Texture("picture", pixels))
+    scene = scene_of([rectangle((0, 0, 0), (1, 0, 0), (0, 1, 0), cuts=(5, 5), material=glow)])
+    scene.uvs[:] = scene.corners[..., :2]
+    whole = emitters_of(scene, (0, 0, 0))
+    monkeypatch.setattr("addon.core.emitters.MOST_PIECES", 250)
+    few = emitters_of(scene, (0, 0, 0))
+    assert len(whole.corners) == 50 * TEXTURE_CUTS**2
+    assert len(few.corners) == 50 * 4
+    # each has the mean of 64 points of what is interpolated between 8 x 8 pixels
+    assert flux(few) == pytest.approx(flux(whole), rel=0.01)
 
 
 def test_what_neither_glows_nor_has_an_area_is_left_out():
