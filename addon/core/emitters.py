@@ -18,9 +18,11 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 MOST_GROUPS = 96  # groups of glowing triangles: each receiver weighs every group
 GROUP_TRIANGLES = 8  # a group of no more has a closed form in the kernel
-TEXTURE_CUTS = 8  # a triangle whose glow is an image is cut into so many squared,
-MOST_PIECES = 1 << 20  # all of them into no more, about, each with the mean of
-MOST_FINER, TEXTURE_LOOKUPS = 8, 1 << 22  # at the most so many points, squared, and of all of them so many
+# A triangle whose glow is an image is cut into pieces, each with the mean of what the image has at many points of it.
+TEXTURE_CUTS = 8  # along a side, at the most
+MOST_PIECES = 1 << 20  # of all triangles, about: where there are many, each is cut into fewer
+MOST_FINER = 8  # points along a piece's side, at the most
+TEXTURE_LOOKUPS = 1 << 22  # of all points, at the most
 
 
 def luminance_of(light):

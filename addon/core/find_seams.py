@@ -17,17 +17,22 @@ from .triangles import unit_normals
 
 SAME_UV = 1 / 1024  # texels: what edges of triangles that lie beside each other in a chart may differ by
 BLOCK = 1 << 18  # triangles, or points on edges, at once
-STEP = 1.0  # texels between points along a seam, from each side; more, where that would be more than
-MOST_POINTS = 1 << 20  # in all, as where each face is a chart
-BEYOND, LIFT = 0.05, 0.1  # texels beyond the edge and above it, from where a ray looks for the other side,
-DEPTH = 0.3  # no farther down,
-LEVEL = 0.02  # whose plane the edge is off by no more
-SAME_NORMAL = np.cos(np.radians(1.5))  # of shading, of both sides
-APART = 0.5  # texels; what is looked up nearer to each other has no seam
-SIGHTS = (0.5, 1.0)  # texels above the surface, from where the edge is to see all texels that are looked up; from lower
-# a ball of few texels would hide its own: what lies flat is met on the way up, by each from
-LYING = 0.02  # times the first of these
-NEAR = 3.0  # texels away is what is looked up; where charts touch, others' texels are
+STEP = 1.0  # texels between points along a seam, from each side
+MOST_POINTS = 1 << 20  # of all seams: where each face is a chart, points lie farther apart
+# From beyond an edge a ray looks down for the other side.
+BEYOND, LIFT = 0.05, 0.1  # texels beyond the edge, and above it, where the ray starts
+DEPTH = 0.3  # texels that it looks down
+LEVEL = 0.02  # texels that the edge may lie off the plane of what it finds
+SAME_NORMAL = np.cos(np.radians(1.5))  # of the shading of both sides
+# What is looked up on both sides must not be one, nor parted by anything.
+APART = 0.5  # texels: what is looked up nearer to each other has no seam
+NEAR = 3.0  # texels: what is looked up farther away is that of others, where charts touch
+SIGHTS = (
+    0.5,
+    1.0,
+)  # texels above the surface, from where the edge must see all texels that are looked up: lower, a
+# ball of few texels hides its own
+LYING = 0.02  # times the first of these: from so low rays go up, as they meet what lies flat
 
 
 def find_seams(scene: Scene, kernel: KernelScene, receivers: Receivers, uvs, cells, poll=lambda: None) -> Seams:

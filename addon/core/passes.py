@@ -21,25 +21,33 @@ from .smoothing import TexelGrid
 from .vertex_graph import VertexGraph
 from .workers import within
 
-LEAST_FIRST, MOST_FIRST = 2, 8  # rays of a replicate in the first pass; few may miss what is bright and small, and
-MANY = 1 << 16  # not know it, but of so many receivers neighbours vouch for each other: fewer begin with the most
-FINE = 3 << 20  # texels or more begin with half as many, as neighbours lie so much nearer: light is no finer for them
-FIRST_ERROR = 0.1  # over the target is what they begin with, to a power of two: one ray far off leaves a blotch
-HURRY = 4  # such passes could be had in the time there is, at the least: else all begin with the fewest
-MOST_RAYS = 2048  # of a replicate; a last few that are not WORTH a pass are not taken
-MOST_COST = 15  # times what the fewest first rays cost (vertices' most) may all passes, and FREE_RAYS at least,
-FREE_RAYS = 1 << 26
-USUAL_ERROR = 0.05  # for an error of this; a smaller one takes more by its square
-WORTH_IT = 0.97  # of the error that a pass leaves at the most: after MOST_IDLE that leave more, what is wrong is not
-MOST_IDLE = 2  # the noise
-AIM, DENOISED_AIM = 0.95, 1.03  # of the target: what receivers are due is an estimate, and a denoiser takes off some
-VERTEX_AIM = 0.85  # they fall short by more where neighbours are few
-STEP = 0.85  # of gathered light's error, at the most, is aimed at: who is due hardly more than it has gets nothing
+# The first pass: rays of a replicate that each receiver starts with.
+LEAST_FIRST, MOST_FIRST = 2, 8  # few rays may all miss what is bright and small, and their spread does not tell
+MANY = 1 << 16  # receivers: neighbours vouch for each other, so that each may start with the fewest; else with the most
+FINE = 3 << 20  # texels: neighbours lie so near that half as many do, as light is no finer than in coarser lightmaps
+FIRST_ERROR = 0.1  # over the target is how many there are, to a power of two: one ray far off leaves a blotch
+HURRY = 4  # first passes that the time limit must have room for; where it has not, all start with the fewest
+
+# What ends the passes.
+MOST_RAYS = 2048  # of a replicate, for any receiver
+MOST_COST = 15  # times what a first pass of the fewest rays costs (of vertices, the most) is the budget of all passes
+FREE_RAYS = 1 << 26  # that the budget is at the least
+USUAL_ERROR = 0.05  # a smaller target has a budget larger by the square of the ratio
+WORTH_IT = 0.97  # of the error before is what a pass must leave at the most, or else it was idle
+MOST_IDLE = 2  # idle passes: what is wrong then is not the noise, and more rays do not help
+ENOUGH = 1 / 64  # of the receivers that want more rays must be affordable, for a pass to be worth it
+
+# What a pass aims at.
+AIM = 0.95  # of the target: what receivers are due is an estimate
+DENOISED_AIM = 1.03  # of the target, where a denoiser takes some off
+VERTEX_AIM = 0.85  # of the target: estimates fall short by more where neighbours are few
+STEP = 0.85  # of the gathered light's error, at the most: who is due hardly more than it has would get nothing
 LEAST_PART = 0.5  # of the error aimed at is left to gathered light, however noisy the direct light is
+
+# What comes after the target is met, or nearly.
 DENOISE = 1.15  # times the target: from there the denoiser may come to it; else it is asked in the end
-SPECKLE = 2.0  # times the target: receivers that noisy are seen when the first pass meets it; then they get GROWTH
-SPECKLE_SHARE = 1 / 8  # times more, and of all no more than so many of those traced. Other passes are for these, too
-ENOUGH = 1 / 64  # of the receivers that want it: a pass that can afford fewer is not worth it
+SPECKLE = 2.0  # times the target: receivers noisier than that get a pass of their own when the first pass meets it
+SPECKLE_SHARE = 1 / 8  # of the rays so far is what that pass may take
 
 
 @dataclass(frozen=True, slots=True)

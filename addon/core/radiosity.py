@@ -29,20 +29,30 @@ from .transport import form_factors
 from .triangles import triangle_areas
 from .workers import within
 
-# patches, about, that each solver is given; triangles are never joined, so there may be more
+# How many patches there are, about.
 PATCH_BUDGETS = {"direct": 1200, "conjugate-gradient": 5000, "progressive": 3000, "stochastic": 60000}
-MOST_PATCHES_OF = {"direct": DIRECT_LIMIT // 2, "conjugate-gradient": EXCHANGE_LIMIT // 2}  # by their sides
-DRAFT_BUDGET, DRAFT_ERROR = 15000, 0.05  # of stochastic, at the least, where errors larger than this are good enough
-COARSE_SHARE = 1 / 4  # of these, that are all of one size at first,
-ROUND_SHARES = (0.25, 0.75)  # and that each round may add by cutting them where the light changes
-LIGHTMAP_ERROR = QUICK_ERROR  # at the least, is good enough for patches, and small ones are joined, where a lightmap
-MOST_AREA = 0.9  # has texels on so much of the scene: looks from one to the other mend the light, unless there are
-MANY_LIGHTS = 64  # or more (as in native/src/gather.c): where rays go on they take what patches have of these
-USUAL_ERROR = 0.05  # for which the stochastic solver shoots
-RAYS_A_SIDE = 8  # in the first step, shared by flux,
-MOST_SHOT = 500_000  # of no more than so many sides: of more, gather rays see the mean of many,
-LEAST_RAYS, MOST_RAYS = 1 << 18, 1 << 25  # and of enough where there are few; what the smallest errors may ask for
-ROWS_SHARE = 0.8  # of the time of a solver that takes all rows of form factors go to these
+MOST_PATCHES_OF = {"direct": DIRECT_LIMIT // 2, "conjugate-gradient": EXCHANGE_LIMIT // 2}  # a patch has two sides
+DRAFT_BUDGET = 15000  # of the stochastic solver, where DRAFT_ERROR or a larger one is good enough
+DRAFT_ERROR = 0.05
+COARSE_SHARE = 1 / 4  # of the budget goes to patches of one size, before any are cut where the light changes
+ROUND_SHARES = (0.25, 0.75)  # of the budget is what each round of such cuts may add
+
+# Where a lightmap has texels on nearly all of the scene, looks from texel to texel mend what patches have wrong.
+MOST_AREA = 0.9  # of the scene's area: so much must have texels
+LIGHTMAP_ERROR = QUICK_ERROR  # is then good enough for patches, if not a larger one is, and small patches are joined
+MANY_LIGHTS = 64  # lights (as in native/src/gather.c): rays that go on take patches' direct light, which is not mended
+
+# How many rays the solvers take.
+USUAL_ERROR = 0.05  # the stochastic solver's rays are those below at this error, and more by the ratio at a smaller one
+RAYS_A_SIDE = 8  # in its first step, shared by flux
+MOST_SHOT = 500_000  # sides: of more, gather rays see the mean of many
+LEAST_RAYS, MOST_RAYS = (
+    1 << 18,
+    1 << 25,
+)  # in all: few sides need more than 8 each; small errors ask for too many
+ROWS_SHARE = 0.8  # of a solver's time goes to the rows of form factors, where it needs them all
+
+# Where light ends.
 LEAST_REFLECTANCE = 1e-3  # below it a side is dark whatever light it gets
 UNSHOT_LIMIT = 1e-3  # of the first flux; what is left is in the report
 CG_LIMIT = 1e-6  # the same of conjugate gradients, which take three steps for it

@@ -16,10 +16,11 @@ from .scene import Scene, SunLight, exitance_from_radiance
 
 SIDE = 128  # of the map that rays look up, about a degree a texel: what is finer no diffuse surface shows
 TAPS = 8  # along a side of each texel
-BRIGHT = 30.0  # times the mean luminance: what an image has above it is taken out for suns,
-WIDEST = 0.05  # of no more than so many radians around their brightest pixel, about three degrees,
-MOST_SPOTS, MOST_SUNS = 256, 16  # of so many spots, those of most light,
-LEAST_SUN = 1e-3  # of all light at the least; the rest stays in the image
+BRIGHT = 30.0  # times the mean luminance is what a pixel must have to be part of a spot
+WIDEST = 0.05  # radians, about three degrees: so far around its brightest pixel a spot reaches
+MOST_SPOTS = 256  # that are looked for
+MOST_SUNS = 16  # that are taken out of the image, of the spots those of most light
+LEAST_SUN = 1e-3  # of all light is what a sun must have; the rest stays in the image
 
 
 def with_suns(scene: Scene) -> Scene:
