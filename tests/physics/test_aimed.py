@@ -77,13 +77,15 @@ def test_hemicubes_between_leaves_at_any_angle(hemicubes, degrees):
     leaf = surface("leaf", [(0, 0, 0), (0, 1, 0), (np.cos(angle), 1, np.sin(angle)), (np.cos(angle), 0, np.sin(angle))])
     exact = AnalyticEstimator().factor(FLOOR, leaf).value
     found = hemicubes.factor(FLOOR, leaf)
-    assert found.value == pytest.approx(exact, abs=1e-4)
+    # what it states must hold, and be worth something: of the 1 that a leaf of 0.1 degrees gets, a ten-thousandth
     assert abs(found.value - exact) <= found.bound
+    assert found.value == pytest.approx(exact, abs=1e-4)
 
 
 def test_a_hemicube_without_pixels_on_a_needle_still_knows_its_size(hemicubes):
     needle = surface("needle", [(0, 0, 1), (1e-7, 0, 1), (1, 1, 1)][::-1])
     exact = AnalyticEstimator().factor(FLOOR, needle).value
+    # no pixel over it tells what is hidden, so it is all seen: its size is the closed form at points of the floor
     assert hemicubes.factor(FLOOR, needle).value == pytest.approx(exact, rel=1e-4)
 
 

@@ -49,6 +49,7 @@ def factor(first, second):
 
 @pytest.mark.parametrize(("a", "b", "c"), [(1, 1, 1), (4, 1, 1), (10, 10, 1), (1, 1, 0.1), (2, 3, 5)])
 def test_opposed_rectangles_are_howells_c11(a, b, c):
+    # both are sums of terms some hundred times their result, in float64
     assert factor(up((0, a), (0, b), 0), down((0, a), (0, b), c)) == pytest.approx(howell.c11(a, b, c), rel=1e-11)
 
 
@@ -91,6 +92,7 @@ def test_hinged_squares_are_additive_in_both(degrees):
     middle = 0.5 * (second[0] + second[3]), 0.5 * (second[1] + second[2])
     near, far = np.array([second[0], second[1], middle[1], middle[0]]), np.array([middle[0], middle[1], *second[2:]])
     whole = exchange(first, second)
+    # the contour integral is to 1e-9 of each pair, and three are compared
     assert exchange(first, near) + exchange(first, far) == pytest.approx(whole, rel=1e-8)
 
 
@@ -233,6 +235,7 @@ def test_a_closed_cylinder_takes_all_light():
 
 def test_rings_of_a_sphere_take_all_light():
     rings = sphere("s", 1, np.linspace(0, np.pi, 9), 16, looks_in=True).rings
+    # far panels by four Gauss points a side, as above
     assert ring_exchanges(rings).sum(axis=1) == pytest.approx([ring.area for ring in rings], rel=1e-5)
 
 

@@ -94,6 +94,7 @@ def test_the_sheet_shows_what_arrives_behind_it(target):
         pixels = result.lightmap.pixels
         stored = pixels[pixels[..., 1] > 0].mean(axis=0)
     expected = TAU / (RHO + TAU) / (1 - RHO) / np.pi
+    # the mean of a sheet's texels, whose error is a few per cent each, but for what rooms' corners interpolate
     assert stored == pytest.approx([expected] * 3, rel=0.02)
     assert result.report.target_reached
 
@@ -122,5 +123,6 @@ def test_an_image_says_where_the_sheet_is_translucent(target):
         pixels, middles = result.lightmap.pixels, result.lightmap.uvs[span].mean(axis=1)
         columns, rows = (middles * pixels.shape[1::-1]).astype(int).T
         x, light = scene.corners[span][..., 0].mean(axis=1), pixels[rows, columns, 1]
+    # nothing and all, but for texels whose image is interpolated between both
     assert light[x < 0.45].max() < 1e-3
     assert light[x > 0.55].min() > 0.1
