@@ -104,6 +104,6 @@ def test_next_to_no_light_passes_under_a_wall_between_texels_of_one_floor():
     x = np.einsum("nk,nkc->nc", barycentrics, scene.corners[triangles])[:, 0]
     beside = 0.1  # m of the wall: ten texels, whose own light there is some of both
     lit, dark = light[x < 1.013 - beside].mean(), light[x > 1.013 + beside].mean()
-    # exact: none. README's limit is a thousandth; 1.4e-3 was measured here, where it was 8e-3 before patches under walls
+    # exact: none. README's limit is a thousandth; 1.4e-3 was measured here, and 8e-3 before patches under walls
     # were looked at more closely. Nothing bounds it but that: this holds what was won
     assert dark < 2e-3 * lit
