@@ -14,7 +14,8 @@ from .triangles import unit_normals
 STEEPEST = 40.0  # degrees between a corner's normal and its face: an icosahedron's are 37, a cube's 55
 BEND = 60.0  # degrees between faces at the most, for an edge that is smooth where a corner was too steep
 FLAT = 1.0  # degrees: such corners are not shaded smooth
-BLOCK = 1 << 17  # triangles at once
+MOST_FACES = 256  # about a vertex; pairs of more take too long
+BLOCK, AT_ONCE = 1 << 17, 1 << 16  # triangles, and corners of which all pairs at a vertex are taken, at once
 COSINE_OF = {angle: np.cos(np.radians(angle + 0.01)) for angle in (STEEPEST, BEND, FLAT)}
 
 
@@ -33,12 +34,23 @@ def without_steep_normals(scene: Scene):
     at_edge[triangles[is_steep]] = True
     corners = np.argwhere(at_edge[triangles])
     corners = corners[np.argsort(triangles[tuple(corners.T)], kind="stable")]
-    found, owners = _means_of_gentle_bends(scene, corners), tuple(corners.T)
-    is_smooth = _leaning(scene, FLAT)[owners]
-    normals = normals.copy()
-    normals[corners[is_smooth, 0], corners[is_smooth, 1]] = found[is_smooth]
-    is_changed[corners[is_smooth, 0]] = True
+    is_smooth, normals = _leaning(scene, FLAT), normals.copy()
+    for some in _by_vertices(triangles[tuple(corners.T)], corners):
+        found = _means_of_gentle_bends(scene, some)
+        chosen = is_smooth[tuple(some.T)]
+        normals[tuple(some[chosen].T)] = found[chosen]
+        is_changed[some[chosen, 0]] = True
     return normals, is_changed
+
+
+def _by_vertices(vertices, corners):
+    """Sorted corners (K, 2) of vertices (K,) in parts of about AT_ONCE that end with all corners of a vertex."""
+    ends = np.append(np.flatnonzero(np.diff(vertices)) + 1, len(vertices))
+    start = 0
+    while start < len(corners):
+        stop = int(ends[min(np.searchsorted(ends, start + AT_ONCE), len(ends) - 1)])
+        yield corners[start:stop]
+        start = stop
 
 
 def _leaning(scene, degrees):
@@ -59,8 +71,10 @@ def _means_of_gentle_bends(scene, corners):
     flat = unit_normals(places)
     vertices = scene.triangles[tuple(corners.T)]
     _, first, counts = np.unique(vertices, return_index=True, return_counts=True)
-    # each corner beside each of its vertex
+    # each corner beside each of its vertex; of too many, which no smooth surface has, beside itself alone
+    is_crowded = np.repeat(counts > MOST_FACES, counts)
     begins, sizes = np.repeat(first, counts), np.repeat(counts, counts)
+    begins, sizes = np.where(is_crowded, np.arange(len(corners)), begins), np.where(is_crowded, 1, sizes)
     one = np.repeat(np.arange(len(corners)), sizes)
     other = np.arange(len(one)) - np.repeat(np.cumsum(sizes) - sizes, sizes) + np.repeat(begins, sizes)
     is_gentle = np.einsum("nc,nc->n", flat[one], flat[other]) >= COSINE_OF[BEND]

@@ -78,6 +78,22 @@ def test_normals_that_stand_for_the_face_are_left():
     assert not is_changed.any()
 
 
+def test_many_faces_about_a_vertex_and_many_vertices_are_no_more_than_their_sum(monkeypatch):
+    """A cone of a thousand sides, of which the tip has no normal; the same in parts as at once."""
+    sides = 1000
+    points, _ = prism(sides)
+    cone = np.concatenate([points[:sides], [(0, 0, 3)]]), [(k, (k + 1) % sides, sides) for k in range(sides)]
+    scene = shaded_smooth(cone, box(centre=(5, 0, 0)))
+    normals, is_changed = without_steep_normals(scene)
+    flat = flat_normals(scene)
+    # fifteen degrees from the axis the sides' mean at the tip is the axis itself: each side keeps its own there
+    assert normals[:sides, 2] == pytest.approx(flat[:sides, 2], abs=1e-6)
+    assert normals[sides:] == pytest.approx(flat[sides:], abs=1e-6)
+    assert is_changed.all()
+    monkeypatch.setattr("addon.core.shading_normals.AT_ONCE", 7)
+    assert (without_steep_normals(scene)[0] == normals).all()
+
+
 def test_it_is_told_and_of_which_object():
     smooth = shaded_smooth(box(), sphere(centre=(3, 0, 0)))
     assert sound_faces(smooth).scene.warnings == (
