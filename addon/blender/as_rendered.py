@@ -24,11 +24,15 @@ SIMPLIFIED = {
 def as_rendered(bpy_scene, view_layer):
     """While it lasts, the view layer's depsgraph has what a render shows: hidden objects, render levels of modifiers.
 
-    Objects that no render shows may still be there. Afterwards all is as it was.
+    What no render shows is not there, nor are its instances by collections, but those that name it alone, as Cycles
+    has it. Afterwards all is as it was.
     """
+    selected = [o for o in view_layer.objects if o.select_get(view_layer=view_layer)]
+    active = view_layer.objects.active
     hidden = [o for o in view_layer.objects if not o.hide_render and o.hide_get(view_layer=view_layer)]
     with ExitStack() as back:
         back.callback(view_layer.update)
+        back.callback(_select, selected, active, view_layer)
         for owner, name, value in _differences(bpy_scene, view_layer):
             back.callback(_set, owner, name, getattr(owner, name))
             setattr(owner, name, value)
@@ -44,6 +48,16 @@ def _set(owner, name, value):
         setattr(owner, name, value)
 
 
+def _select(objects, active, view_layer):
+    """As before: what was hidden for a while is selected no longer."""
+    for blender_object in objects:
+        with suppress(ReferenceError, RuntimeError):
+            blender_object.select_set(True, view_layer=view_layer)
+    with suppress(ReferenceError, RuntimeError):
+        if view_layer.objects.active != active:
+            view_layer.objects.active = active
+
+
 def _hide(blender_object, view_layer):
     with suppress(ReferenceError, RuntimeError):  # where it is gone, or no longer in the layer
         blender_object.hide_set(True, view_layer=view_layer)
@@ -53,8 +67,10 @@ def _differences(bpy_scene, view_layer):
     """(owner, attribute, value) of all that the viewport has otherwise than a render."""
     wanted = [*_simplified(bpy_scene.render), *_of_collections(view_layer)]
     for blender_object in bpy.data.objects:
-        if not blender_object.hide_render:
-            wanted.append((blender_object, "hide_viewport", False))
+        # what is instanced on vertices or faces would have no instances where it is hidden; in a render it has
+        on_faces = blender_object.parent and blender_object.parent.instance_type in {"VERTS", "FACES"}
+        if not (blender_object.hide_render and on_faces):
+            wanted.append((blender_object, "hide_viewport", blender_object.hide_render))
         shows_itself = blender_object.show_instancer_for_render
         wanted.append((blender_object, "show_instancer_for_viewport", shows_itself))
         for modifier in blender_object.modifiers:
@@ -81,12 +97,8 @@ def _simplified(render):
 
 
 def _of_collections(view_layer):
-    """The viewport's switches of a collection and of its place in the layer; a render knows only one.
-
-    None is hidden, which would deselect what is in it.
-    """
-    shown = [collection for collection in bpy.data.collections if not collection.hide_render]
-    own = [(collection, "hide_viewport", False) for collection in shown]
+    """The viewport's switches of a collection and of its place in the layer; a render knows only one."""
+    own = [(collection, "hide_viewport", collection.hide_render) for collection in bpy.data.collections]
     layers = _below(view_layer.layer_collection)
     return own + [(layer, "hide_viewport", False) for layer in layers]
 

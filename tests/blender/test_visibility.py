@@ -58,6 +58,36 @@ def test_what_is_hidden_is_instanced_but_by_collections(add_cube):
     assert {name: names.count(name) for name in set(names)} == {"Room": 2, "Leaf": 1, "Faces": 1, "Pebble": 6}
 
 
+def test_what_is_hidden_in_what_is_instanced(add_cube):
+    """An asset, as they are laid out: a scatter and its hidden source in one collection, and one within another."""
+    asset, outer = bpy.data.collections.new("Asset"), bpy.data.collections.new("Outer")
+    scatter, hidden = add_cube("Scatter"), [add_cube(name) for name in ("Leaf", "Ghost")]
+    scatter.modifiers.new("Nodes", "NODES").node_group = nodes_that_instance(hidden[0])
+    for cube in (scatter, *hidden):
+        asset.objects.link(cube)
+        bpy.context.scene.collection.objects.unlink(cube)
+    for cube in hidden:
+        cube.hide_render = True
+    places = [bpy.data.objects.new(name, None) for name in ("Inner place", "Outer place")]
+    for place, collection, home in zip(places, (asset, outer), (outer, bpy.context.scene.collection)):
+        place.instance_type, place.instance_collection = "COLLECTION", collection
+        home.objects.link(place)
+    add_cube("Room")
+    names = sorted(o.name.split("#")[0] for o in read_scene(bpy.context.scene).objects)
+    assert names == ["Leaf", "Room"]
+
+
+def test_reading_leaves_what_was_selected_and_hidden(add_cube):
+    cubes = [add_cube(name) for name in ("Room", "Hidden", "Away")]
+    cubes[1].hide_render = cubes[2].hide_viewport = True
+    cubes[1].select_set(True)
+    bpy.context.view_layer.objects.active = cubes[1]
+    read_scene(bpy.context.scene)
+    assert [cube.select_get() for cube in cubes[:2]] == [False, True]
+    assert bpy.context.view_layer.objects.active == cubes[1]
+    assert [cube.hide_viewport for cube in cubes] == [False, False, True]
+
+
 def nodes_that_instance(blender_object):
     """Geometry nodes that give nothing but one instance of an object."""
     tree = bpy.data.node_groups.new("Scatter", "GeometryNodeTree")
