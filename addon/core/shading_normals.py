@@ -13,7 +13,7 @@ from .triangles import unit_normals
 
 STEEPEST = 40.0  # degrees between a corner's normal and its face: an icosahedron's are 37, a cube's 55
 BEND = 60.0  # degrees between faces at the most, for an edge that is smooth where a corner was too steep
-FLAT = 1.0  # degrees: such corners are not shaded smooth
+FLAT = 1.0  # degrees: corners nearer to their face are not shaded smooth, and normals nearer to each other are one
 MOST_FACES = 256  # about a vertex; pairs of more take too long
 BLOCK, AT_ONCE = 1 << 17, 1 << 16  # triangles, and corners of which all pairs at a vertex are taken, at once
 COSINE_OF = {angle: np.cos(np.radians(angle + 0.01)) for angle in (STEEPEST, BEND, FLAT)}
@@ -22,11 +22,14 @@ COSINE_OF = {angle: np.cos(np.radians(angle + 0.01)) for angle in (STEEPEST, BEN
 def without_steep_normals(scene: Scene):
     """Corner normals float32 (T, 3, 3), and of which triangles some are others than they were, bool (T,).
 
-    At vertices where a corner's normal leans too far off its face, the smooth corners get the mean of the faces about
-    them that bend by less than an edge does, by angle (Thuermer & Wuethrich 1998), or else their face's own.
+    At vertices where a target's corner has a normal that leans too far off its face, the smooth corners get the mean
+    of the faces about them that share their normal and bend by less than an edge does, by angle (Thuermer & Wuethrich
+    1998), or else their face's own.
     """
     normals, triangles = scene.corner_normals, scene.triangles
     is_steep = _leaning(scene, STEEPEST)
+    for obj in scene.objects:
+        is_steep[obj.span] &= obj.is_target
     is_changed = np.zeros(len(triangles), bool)
     if not is_steep.any():
         return normals, is_changed
@@ -77,7 +80,11 @@ def _means_of_gentle_bends(scene, corners):
     begins, sizes = np.where(is_crowded, np.arange(len(corners)), begins), np.where(is_crowded, 1, sizes)
     one = np.repeat(np.arange(len(corners)), sizes)
     other = np.arange(len(one)) - np.repeat(np.cumsum(sizes) - sizes, sizes) + np.repeat(begins, sizes)
-    is_gentle = np.einsum("nc,nc->n", flat[one], flat[other]) >= COSINE_OF[BEND]
+    # what was parted already, by sharp edges or as flat, has normals of its own
+    normals = scene.corner_normals[tuple(corners.T)].astype(np.float64)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    is_gentle = np.einsum("nc,nc->n", normals[one], normals[other]) >= COSINE_OF[FLAT]
+    is_gentle &= np.einsum("nc,nc->n", flat[one], flat[other]) >= COSINE_OF[BEND]
     one, other = one[is_gentle], other[is_gentle]
     weighted = flat * _angles(places, corners[:, 1])[:, None]
     means = np.stack([np.bincount(one, weighted[other, axis], len(corners)) for axis in range(3)], axis=1)

@@ -12,7 +12,7 @@ import numpy as np
 
 from .ranges import LARGEST_COORDINATE
 from .scene import Scene
-from .shading_normals import BEND, without_steep_normals
+from .shading_normals import STEEPEST, without_steep_normals
 
 # Twice the area over the two sides' lengths: the sine between them. Below this it is rounding, in float32 (scene.c).
 LEAST_SINE = np.float32(2.4e-7)
@@ -145,8 +145,8 @@ def _with_gentle_normals(scene):
 
 def _edge_warning(obj, count):
     return count and (
-        f"object {obj.name}: {count} of {obj.count} triangles are shaded smooth over sharp edges: there they are baked "
-        f"as Shade Auto Smooth at {BEND:g} degrees shows them"
+        f"object {obj.name}: {count} of {obj.count} triangles have shading normals more than {STEEPEST:g} degrees off "
+        "a face, as over sharp edges: they are baked with those of the faces around them, without such edges"
     )
 
 

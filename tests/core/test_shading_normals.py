@@ -97,6 +97,28 @@ def test_many_faces_about_a_vertex_and_many_vertices_are_no_more_than_their_sum(
 def test_it_is_told_and_of_which_object():
     smooth = shaded_smooth(box(), sphere(centre=(3, 0, 0)))
     assert sound_faces(smooth).scene.warnings == (
-        "object object 0: 12 of 12 triangles are shaded smooth over sharp edges: there they are baked as Shade Auto "
-        "Smooth at 60 degrees shows them",
+        "object object 0: 12 of 12 triangles have shading normals more than 40 degrees off a face, as over sharp "
+        "edges: they are baked with those of the faces around them, without such edges",
     )
+
+
+def test_what_is_not_baked_is_left_and_not_told():
+    smooth = shaded_smooth(box(), sphere(centre=(3, 0, 0)))
+    others = replace(smooth, objects=(replace(smooth.objects[0], is_target=False), smooth.objects[1]))
+    assert sound_faces(others).scene.warnings == ()
+    assert without_steep_normals(others)[0] is others.corner_normals
+
+
+@pytest.mark.parametrize("others", ["flat", "parted"])
+def test_faces_that_were_parted_are_not_smoothed_together(others):
+    """Of a prism of eight sides one is smooth over its rims, beside flat ones, or all are, parted by sharp edges."""
+    scene = scene_of(prism(8))
+    flat = flat_normals(scene)
+    # each side has the mean of itself and the end that it meets
+    ends = np.sign(scene.corners[..., 2:] - 0.5) * (0, 0, 1)
+    smooth = slice(0, 2 if others == "flat" else 16)
+    normals = np.array(flat)
+    normals[smooth] = (flat[smooth] + ends[smooth]) / 2**0.5
+    found, is_changed = without_steep_normals(replace(scene, corner_normals=normals.astype(np.float32)))
+    assert is_changed[smooth].all()
+    assert found == pytest.approx(flat, abs=1e-6)
