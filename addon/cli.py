@@ -114,7 +114,7 @@ def run_picture(args: argparse.Namespace) -> None:
 
         for path in (args.output, args.lightmap):
             if path:
-                files.require_writable(path)
+                files.require_savable(path)
         files.open_blend(args.input)
         image = lightmap_of(bpy.context.scene.objects) if args.lightmap else None
         if args.lightmap and image is None:
@@ -133,11 +133,12 @@ def run_verify(args: argparse.Namespace) -> None:
     from .core.shipped_cases import shipped_cases
     from .core.workers import Workers
 
+    threads = thread_count(args.threads)
     cases = load_cases(args.cases) if args.cases else shipped_cases()
     if args.report:
         args.report.touch()  # fail before the work rather than after it
     print(verify.HEADER)
-    with Workers(thread_count(args.threads)) as workers:
+    with Workers(threads) as workers:
         estimator = make_estimator(args.method, workers, args.seed)
         results = verify.run_cases(cases, estimator, args.method, lambda result: print(verify.row(result), flush=True))
     print(verify.summary(results, args.method, estimator.setting))

@@ -43,9 +43,9 @@ def add_bake(commands) -> None:
     add(
         "--smooth-angle",
         type=float,
-        default=DEFAULTS.smooth_angle_deg,
         metavar="DEGREES",
-        help="smooth faces that meet at less share vertex colours (default: %(default)s)",
+        help="smooth faces that meet at less share vertex colours (target vertex; default: "
+        f"{DEFAULTS.smooth_angle_deg:g})",
     )
     add("--patch-size", type=float, metavar="METRES", help="longest edge of a patch (default: by the scene)")
     add("--no-denoise", action="store_true", help="keep Blender's denoiser out of lightmaps")
@@ -80,7 +80,7 @@ def settings_from(args: argparse.Namespace) -> BakeSettings:
         keep_uvs=args.keep_uvs,
         patch_size=args.patch_size,
         denoise=not args.no_denoise,
-        smooth_angle_deg=args.smooth_angle,
+        smooth_angle_deg=DEFAULTS.smooth_angle_deg if args.smooth_angle is None else args.smooth_angle,
         seed=args.seed,
         threads=args.threads,
     )
@@ -91,9 +91,12 @@ def run_bake(args: argparse.Namespace) -> None:
     settings = settings_from(args)
     if args.exr and args.target != "lightmap":
         raise CommandError("--exr writes the lightmap: it needs --target lightmap")
+    if args.smooth_angle is not None and args.target != "vertex":
+        raise CommandError("--smooth-angle is of vertex colours: it needs --target vertex")
     output = args.output or args.input.with_name(f"{args.input.stem}_baked.blend")
-    if args.report and args.report.resolve() in (args.input.resolve(), output.resolve()):
-        raise CommandError(f"--report {args.report} is the scene's own file: the report needs another")
+    exr = args.exr / f"{output.stem}.exr" if args.exr else None
+    if args.report and args.report.resolve() in {path.resolve() for path in (args.input, output, exr) if path}:
+        raise CommandError(f"--report {args.report} is another file of this bake: it needs one of its own")
     seconds: dict[str, float] = {}
     with with_blender() as bpy, ProgressBar() as progress:
         from .blender import bake_scene, files
@@ -119,19 +122,21 @@ def run_bake(args: argparse.Namespace) -> None:
             report = result.report.with_stages(seconds)
             if args.report:
                 args.report.write_text(json.dumps(report.as_dict(), indent=2) + "\n")
-            if args.exr:  # last: what fails here loses nothing else
-                _save_exr(prepared, args.exr / f"{output.stem}.exr")
+            if exr:  # last: what fails here loses nothing else
+                _save_exr(prepared, exr)
     _tell(args.input, output, report)
 
 
 def _require_writable(output, args):
     """Fail before the work rather than after it."""
-    from .blender.files import require_writable
+    from .blender.files import require_savable, require_writable
 
-    require_writable(output)
+    require_savable(output)
     if args.report:
         require_writable(args.report)
     if args.exr and args.exr.exists():
+        if not args.exr.is_dir():
+            raise CommandError(f"--exr {args.exr}: is a file, not a folder")
         require_writable(args.exr / "lightmap.exr")
     elif args.exr:
         require_writable(args.exr)

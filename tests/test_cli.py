@@ -100,6 +100,7 @@ def test_wrong_usage_is_refused_by_the_parser(words, capsys):
         (["--time-limit", "0"], "time_limit"),
         (["--method", "hemicube", "--solver", "stochastic"], "stochastic"),
         (["--target", "vertex", "--exr", "."], "--exr"),
+        (["--smooth-angle", "20"], "--smooth-angle"),
     ],
 )
 def test_a_setting_out_of_range_is_named(words, named, capsys):
@@ -243,10 +244,11 @@ def test_a_bake_that_fails_after_opening_keeps_an_older_result(room_blend, capsy
     assert older.read_bytes() == b"older"
 
 
-@pytest.mark.parametrize("name", ["room.blend", "room_baked.blend"])
-def test_the_report_is_no_scene(name, room_blend, capsys):
+@pytest.mark.parametrize("name", ["room.blend", "room_baked.blend", "room_baked.exr"])
+def test_the_report_is_no_other_file_of_the_bake(name, room_blend, capsys):
     before = contents(room_blend.parent)
-    fails_with_one_line(capsys, ["bake", room_blend, "--report", room_blend.with_name(name)], "--report", name)
+    words = ["bake", room_blend, "--exr", room_blend.parent, "--report", room_blend.with_name(name)]
+    fails_with_one_line(capsys, words, "--report", name)
     assert contents(room_blend.parent) == before
 
 
@@ -259,7 +261,7 @@ def test_a_device_is_no_file_to_save_as(room_blend, capsys):
 def test_what_stands_where_the_exr_should_go_is_told_before_the_bake(room_blend, capsys):
     folder = room_blend.with_name("exr")
     folder.write_bytes(b"a file")
-    fails_with_one_line(capsys, ["bake", room_blend, "--exr", folder], "exr")
+    fails_with_one_line(capsys, ["bake", room_blend, "--exr", folder], "exr", "is a file")
     assert folder.read_bytes() == b"a file"
     assert not room_blend.with_name("room_baked.blend").exists()
 

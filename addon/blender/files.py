@@ -38,8 +38,6 @@ def require_writable(path) -> None:
     path = Path(path)
     if path.is_dir():
         raise FileError(f"{path}: is a folder, not a file")
-    if path.exists() and not path.is_file():
-        raise FileError(f"{path}: is a device, not a file")
     folder = path.resolve().parent
     if not folder.is_dir():
         raise FileError(f"{folder}: there is no such folder")
@@ -48,6 +46,13 @@ def require_writable(path) -> None:
             pass
     except OSError as error:
         raise FileError(f"{folder}: cannot be written to ({error.strerror})") from error
+
+
+def require_savable(path) -> None:
+    """The same for what is written beside ``path`` and renamed, which would take a device's place."""
+    require_writable(path)
+    if Path(path).exists() and not Path(path).is_file():
+        raise FileError(f"{path}: is a device, not a file")
 
 
 def save_blend(path) -> None:
@@ -72,7 +77,7 @@ def save_exr(image, path) -> None:
 
 def _write_whole(path, write):
     """Write beside ``path`` under another name and rename, so that a failure leaves what was there."""
-    require_writable(path)
+    require_savable(path)
     path = Path(path).resolve()
     part = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:

@@ -58,7 +58,7 @@ def place_mesh(mesh: MeshArrays, matrix: np.ndarray, materials: np.ndarray, uvs:
     )
 
 
-def unit_normals(vertices, triangles, io_normals, is_flat):
+def make_unit_normals(vertices, triangles, io_normals, is_flat):
     """Make corner normals (T, 3, 3) of all meshes unit ones, of the triangle itself where it ``is_flat`` (T,).
 
     For the whole scene at once: 800 objects would pay NumPy's calls 800 times.

@@ -13,6 +13,8 @@ LONGEST_SIDE = 2048
 RIM = 1 / 18  # of a clipped image: so much that some is left where nodes shrink it,
 LEAST_CLIPPED = 16  # and that a side of so many texels has one
 
+LEAST_ALPHA = np.float32(1e-6)  # of less nothing is seen, and no colour can be told
+
 LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "scene_linear"}
 
 
@@ -84,7 +86,7 @@ def linear_pixels(image, is_by_alpha: bool, warn) -> np.ndarray:
         if is_by_alpha and not image.is_float:
             pixels = pixels * alpha
         elif not is_by_alpha and image.is_float:
-            pixels = pixels / np.where(alpha > 0, alpha, np.float32(1))
+            pixels = np.where(alpha > LEAST_ALPHA, pixels / np.maximum(alpha, LEAST_ALPHA), np.float32(0))
     if not image.is_float:
         space = image.colorspace_settings.name
         if space not in LINEAR_SPACES:

@@ -17,7 +17,7 @@ from .as_rendered import as_rendered
 from .materials import Materials
 from .mesh_colours import MeshColours
 from .new_meshes import NewMeshes
-from .place_mesh import PlacedMesh, place_mesh, unit_normals
+from .place_mesh import PlacedMesh, make_unit_normals, place_mesh
 from .read_lights import read_lights
 from .read_mesh import MeshArrays, are_finite, read_mesh
 from .read_world import read_world
@@ -128,7 +128,7 @@ class SceneReading:
         triangles = [p.triangles + first for p, first in zip(self.placed, first_vertices)]
         triangles = _joined(triangles, np.int32, (0, 3))
         corner_normals = _joined([p.corner_normals for p in self.placed], np.float32, (0, 3, 3))
-        unit_normals(vertices, triangles, corner_normals, _joined([p.is_flat for p in self.placed], bool, (0,)))
+        make_unit_normals(vertices, triangles, corner_normals, _joined([p.is_flat for p in self.placed], bool, (0,)))
         return Scene(
             vertices=vertices,
             triangles=triangles,

@@ -18,7 +18,7 @@ from .bench_light import bake_rows, solver_rows
 from .bench_peers import installed_peers
 from .bench_row import BenchRow
 from .bench_scenes import SCENES, exact_scene
-from .settings import SettingsError, thread_count
+from .settings import SettingsError, require_threads, thread_count
 from .workers import Workers
 
 PACKAGES = ("patchlight", "numpy", "embreex", "xatlas", "bpy", "pyviewfactor", "raystrack", "matplotlib")
@@ -49,7 +49,7 @@ class BenchOptions:
                 raise SettingsError(f"scene is {name}: allowed is {', '.join(SCENES)}")
         if self.runs < 1:
             raise SettingsError(f"runs is {self.runs}: allowed is 1 and above")
-        thread_count(self.threads)
+        require_threads(self.threads)
 
     @property
     def thread_count(self) -> int:

@@ -63,11 +63,11 @@ class BakeSettings:
         _require("error", self.error, 1e-4 <= self.error <= 1.0, "0.0001 ... 1")
         _require("time_limit", self.time_limit, self.time_limit is None or self.time_limit > 0, "above 0 s")
         _require("texels", self.texels, 64 <= self.texels <= 1 << 28, "64 ... 268435456")
-        _require("density", self.density, self.density is None or self.density > 0, "above 0 texels/m")
+        _require("density", self.density, self.density is None or 0 < self.density <= 1e9, "up to 1e9 texels/m")
         _require("patch_size", self.patch_size, self.patch_size is None or self.patch_size > 0, "above 0 m")
         _require("smooth_angle_deg", self.smooth_angle_deg, 0 <= self.smooth_angle_deg <= 180, "0 ... 180 degrees")
         _require("seed", self.seed, 0 <= self.seed < 1 << 32, "0 ... 4294967295")
-        thread_count(self.threads)
+        require_threads(self.threads)
         if self.method == "hemicube" and self.solver == "stochastic":
             raise SettingsError("solver stochastic shoots Monte Carlo rays: it cannot use method hemicube")
 
@@ -79,8 +79,13 @@ class BakeSettings:
 
 def thread_count(threads: int) -> int:
     """Threads to run, at least 1, where ``threads`` are asked for, and 0 is all cores."""
-    _require("threads", threads, 0 <= threads <= 1024, "0 ... 1024")
+    require_threads(threads)
     return threads or os.cpu_count() or 1
+
+
+def require_threads(threads: int) -> None:
+    """SettingsError where nobody could run so many."""
+    _require("threads", threads, 0 <= threads <= 1024, "0 ... 1024")
 
 
 def _require(name, value, holds, allowed):

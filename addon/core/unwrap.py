@@ -62,7 +62,9 @@ def _side(scene, targets, uvs, settings):
     """Texels along a square in which the targets' UVs (N, 3, 2) have all of their surface's texels at a density."""
     area = sum(float(triangle_areas(scene.corners[obj.span]).sum()) for obj in targets)
     share = sum(float(triangle_areas(np.pad(kept, ((0, 0), (0, 0), (0, 1)))).sum()) for kept in uvs)
-    texels = area * settings.density**2 / share if share > 0 else math.inf
+    if not share > 0:
+        raise SceneError('the UV layers "Lightmap" have no area: a density gives no size')
+    texels = settings.density * (area / share) * settings.density
     if texels > MOST_TEXELS:
         raise too_dense(settings.density, texels)
     return max(round(math.sqrt(texels)), 1)

@@ -18,6 +18,7 @@ from .job import BakeJob
 EXPECTED_ERRORS = (BakeCancelled, SettingsError, SceneError, OSError, MemoryError)
 
 SECONDS_BETWEEN_POLLS = 0.1
+NEVER_BAKED = {"LIGHT", "CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}  # whatever one might expect
 # While a bake runs these still reach Blender, so that one can look around; nothing that changes the scene does.
 PASSED_ON = {
     *("MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE", "MOUSESMARTZOOM"),
@@ -180,7 +181,10 @@ def _names_to_bake(context):
     if not context.scene.patchlight.only_selected:
         return None
     # lamps and cameras are selected with the room that they stand in
-    return [ob.name for ob in context.selected_objects if ob.type == "MESH"]
+    names = [ob.name for ob in context.selected_objects if ob.type not in NEVER_BAKED]
+    if not names:
+        raise SceneError("nothing to bake: no mesh object is selected")
+    return names
 
 
 def _sentence(error):

@@ -49,17 +49,33 @@ static inline vec3 scene_point(const pl_scene *scene, int32_t triangle, float we
 }
 
 /*
+ * How far a ray may find a triangle off its plane, as it does along slivers: of the normal, a product of two edges, a
+ * rounding of theirs is left, which a height much less than the length makes much of. No more than twice that height.
+ */
+static const float half_ulp = 2.98023223876953e-8f;
+static inline float sliver_rounding(vec3 a, vec3 b, vec3 c) {
+    const vec3 ab = vec3_sub(b, a), ac = vec3_sub(c, a), bc = vec3_sub(c, b);
+    const float longest = sqrtf(greater(vec3_dot(ab, ab), greater(vec3_dot(ac, ac), vec3_dot(bc, bc))));
+    const float twice_area = vec3_length(vec3_cross(ab, ac));
+    if (!(twice_area > 0))
+        return 0;
+    return lesser(half_ulp * longest * longest * longest / twice_area, 2 * twice_area / longest);
+}
+
+/*
  * A point of a triangle moved off its plane by more than the rounding error of its corners, never by a
- * fixed distance: eight units in the last place of their largest coordinate. Rays that leave from here do
- * not meet the face that they leave.
+ * fixed distance: eight units in the last place of their largest coordinate, more on slivers. Rays that leave from
+ * here do not meet the face that they leave.
  */
 static inline vec3 point_off_triangle(const pl_scene *scene, int32_t triangle, vec3 point, vec3 normal) {
     float largest = 0;
+    vec3 corners[3];
     for (int corner = 0; corner < 3; ++corner) {
-        const vec3 p = scene_vertex(scene, triangle, corner);
+        const vec3 p = corners[corner] = scene_vertex(scene, triangle, corner);
         largest = greater(largest, greater(fabsf(p.x), greater(fabsf(p.y), fabsf(p.z))));
     }
-    return vec3_mul_add(normal, eight_ulps * largest, point);
+    const float off = greater(sliver_rounding(corners[0], corners[1], corners[2]), eight_ulps * largest);
+    return vec3_mul_add(normal, off, point);
 }
 
 /* The first opaque triangle from `near` on. */
