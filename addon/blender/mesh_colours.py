@@ -17,14 +17,16 @@ WIDTH, HEIGHT = 512, LEVELS**3 // 512  # as large as nodes leave an image
 
 @dataclass(frozen=True, slots=True)
 class MeshColours:
-    """In place of UVs: the palette's texel of each triangle's mean colour, by an attribute ("" = the render one)."""
+    """In place of UVs: the palette's texel of each triangle's mean colour, by an attribute ("" = the render one), or of
+    the grey that its alpha is."""
 
     attribute: str
+    is_alpha: bool = False
     extends: bool = False  # no place is beyond the palette's edges
 
     def uvs_of(self, mesh, chosen) -> np.ndarray:
         """UVs of chosen triangles (K,) of read_mesh.MeshArrays, float32 (K, 3, 2)."""
-        return palette_uvs(mesh.colours[self.attribute][chosen])
+        return palette_uvs(mesh.colours[self.attribute, self.is_alpha][chosen])
 
 
 def palette() -> Texture:

@@ -348,7 +348,7 @@ class MaterialReading:
             mean = mean_over_view(reached)
             self.say(f"its {reached.node.bl_label} node is taken at its mean over directions, {mean:.2g}")
             return Colour(np.full(3, mean))
-        if reached.node.type in COLOURS_OF_MESH and reached.socket.identifier == "Color":
+        if reached.node.type in COLOURS_OF_MESH:
             return self._mesh_colour(reached)
         return read_colour_node(reached, self)
 
@@ -360,8 +360,12 @@ class MaterialReading:
             raise Unreadable(f"{reached.node.bl_label} node")
         if not attribute and reached.node.type == "ATTRIBUTE":
             return Colour(np.zeros(3))  # as Cycles has it; a Color Attribute node takes the render colours
-        self._notes.coordinates[MeshColours(attribute)] = MeshColours(attribute)
-        return Colour(np.ones(3), self._images.of_meshes())
+        kind = MeshColours(attribute, is_alpha=reached.socket.identifier == "Alpha")
+        self._notes.coordinates[kind] = kind
+        colour = Colour(np.ones(3), self._images.of_meshes())
+        if reached.socket.identifier == "Fac":  # the mean of its channels, and no luminance
+            return pointwise(lambda c: np.broadcast_to(c.mean(axis=-1, keepdims=True), c.shape), colour)
+        return colour
 
     def _image_colour(self, reached) -> Colour:
         if reached.node.image is None:

@@ -38,7 +38,8 @@ class MeshArrays:
     sharp_edges : bool (T, 3) edge k runs from corner k to corner k + 1
     uvs : dict, name of a UV layer -> float32 (T, 3, 2)
     render_layer : str, the UV layer that textures use; "" where there is none
-    colours : dict, name of an attribute ("" = the render colours) -> float32 (T, 3), the mean; 0 where there is none
+    colours : dict, name of an attribute ("" = the render colours) and whether of its alpha -> float32 (T, 3), the
+        mean; 0 where there is none
     unread_colours : names of those that are there, but cannot be read: 0, too
     """
 
@@ -80,8 +81,8 @@ def read_mesh(mesh, uv_layers=(), colours=()) -> MeshArrays:
         sharp_edges=is_mesh_edge & edge_sharp[corners],
         uvs={layer.name: _layer_uvs(layer)[corners] for layer in mesh.uv_layers if layer.name in wanted},
         render_layer=render_layer,
-        colours={name: _triangle_colours(mesh, name, corners, polygons) for name in colours},
-        unread_colours=tuple(name for name in colours if not _is_readable(mesh, name)),
+        colours={key: _triangle_colours(mesh, *key, corners, polygons) for key in colours},
+        unread_colours=tuple(sorted({name for name, _ in colours if not _is_readable(mesh, name)})),
     )
 
 
@@ -111,14 +112,18 @@ def _attribute(mesh, attribute, name, dtype, width):
     return np.zeros((0, width) if width > 1 else 0, dtype) if found is None else _read(found.data, name, dtype, width)
 
 
-def _triangle_colours(mesh, name, corners, polygons):
-    """An attribute's mean over each triangle as a colour, float32 (T, 3); 0 where there is none, as Cycles has it."""
+def _triangle_colours(mesh, name, is_alpha, corners, polygons):
+    """An attribute's mean over each triangle as a colour, or its alpha as a grey, float32 (T, 3); 0 where there is
+    none, as Cycles has it."""
     found = _colour_attribute(mesh, name)
     if found is None or not _is_readable(mesh, name):
         return np.zeros((len(corners), 3), np.float32)
     kind, dtype, width = VALUES[found.data_type]
     values = np.nan_to_num(_read(found.data, kind, dtype, width).reshape(-1, width).astype(np.float32))
-    values = np.repeat(values, 3, axis=1) if width == 1 else np.pad(values, ((0, 0), (0, max(3 - width, 0))))[:, :3]
+    if is_alpha:
+        values = values[:, 3:] if width == 4 else np.ones_like(values[:, :1])
+    values = values if values.shape[1] > 1 else np.repeat(values, 3, axis=1)
+    values = np.pad(values, ((0, 0), (0, max(3 - values.shape[1], 0))))[:, :3]
     if found.domain == "FACE":
         return values[polygons]
     return values[corners if found.domain == "CORNER" else corner_vertices(mesh)[corners]].mean(axis=1)

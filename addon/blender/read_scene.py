@@ -166,14 +166,14 @@ class SceneReading:
         evaluated = instance.object
         rows = self._slot_materials(evaluated, mesh, seen_by(instance))
         coordinates = [self.materials.coordinates[row] for row in rows]
-        colours = {each.attribute for each in coordinates if isinstance(each, MeshColours)}
+        colours = {(each.attribute, each.is_alpha) for each in coordinates if isinstance(each, MeshColours)}
         arrays = read_mesh(mesh, {each.uv_layer for each in coordinates if isinstance(each, Coordinates)}, colours)
         if not (are_finite(arrays.positions) and are_finite(matrix)):
             self.refusals[name] = f"'{name}' has vertices that are not finite (NaN or infinite): it is left out"
             self.warn(self.refusals[name])
             self.new_meshes.forget(name)
             return
-        for attribute, values in arrays.colours.items():
+        for (attribute, _), values in arrays.colours.items():
             if values.max(initial=0.0) > 1:
                 self.warn(f"'{name}': colours of its attribute '{attribute}' above 1 are read as 1")
         for attribute in arrays.unread_colours:

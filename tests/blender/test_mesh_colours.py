@@ -73,6 +73,43 @@ def test_an_attribute_of_faces_is_a_colour_too(nodes, painted, kind, values):
     assert_close(found, np.repeat(np.broadcast_to(np.reshape(values, (2, -1)), (2, 3)), 2, axis=0))
 
 
+@pytest.mark.parametrize("kind", ["FLOAT_COLOR", "BYTE_COLOR"])
+@pytest.mark.parametrize(
+    ("node", "output", "expected"),
+    [
+        ("Attribute", "Vector", [(0.9, 0.3, 0.0), (0.2, 0.2, 0.8)]),
+        ("Attribute", "Fac", [(0.4, 0.4, 0.4), (0.4, 0.4, 0.4)]),  # the mean of the channels
+        ("Attribute", "Alpha", [(0.5, 0.5, 0.5), (0.25, 0.25, 0.25)]),
+        ("VertexColor", "Alpha", [(0.5, 0.5, 0.5), (0.25, 0.25, 0.25)]),
+    ],
+)
+def test_other_outputs_of_an_attribute(nodes, painted, kind, node, output, expected):
+    material, tree = nodes()
+    source = tree.new(node)
+    setattr(source, "attribute_name" if node == "Attribute" else "layer_name", "Col")
+    tree.show(tree.link(source, tree.new("BsdfDiffuse"), output, "Color"))
+    painted(material, np.repeat([(0.9, 0.3, 0.0, 0.5), (0.2, 0.2, 0.8, 0.25)], 4, axis=0), kind=kind)
+    found, warnings = reflected()
+    # a level off in each channel, the mean of which has no less; bytes are half of 1 / 255 of the encoded colour off
+    np.testing.assert_allclose(np.sqrt(found), np.sqrt(np.repeat(expected, 2, axis=0)), atol=1.02 * STEP)
+    assert warnings == ()
+
+
+def test_a_number_of_no_colour_has_an_alpha_of_one_and_a_mask_of_itself(nodes, painted):
+    """A mask by Geometry Nodes mixes two shaders."""
+    material, tree = nodes()
+    mask, mix = tree.new("Attribute"), tree.new("MixShader")
+    mask.attribute_name = "Mask"
+    tree.link(mask, mix, "Fac", 0)
+    tree.link(tree.new("BsdfDiffuse", Color=(0.0, 0.0, 0.0, 1.0)), mix, 0, 1)
+    tree.link(tree.new("BsdfDiffuse", Color=(0.8, 0.8, 0.8, 1.0)), mix, 0, 2)
+    tree.show(mix)
+    painted(material, [0.25, 1.0], "Mask", "FLOAT", "FACE")
+    found, warnings = reflected()
+    np.testing.assert_allclose(found[:, 0], [0.2, 0.2, 0.8, 0.8], atol=0.8 * 1.02 * STEP)
+    assert warnings == ()
+
+
 def test_nodes_change_what_lies_in_the_mesh(nodes, painted):
     material, tree = nodes()
     invert = tree.link(tree.new("VertexColor"), tree.new("Invert"), "Color", "Color")
