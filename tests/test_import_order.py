@@ -13,18 +13,8 @@ ADDON = ROOT / "addon"
 MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "core": {"core"}}
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
-    *(
-        "ranges",
-        "settings",
-        "environment",
-        "scene",
-        "triangles",
-        "shading_normals",
-        "sound_faces",
-        "textures",
-        "emitters",
-        "sky",
-    ),
+    *("ranges", "settings", "environment", "scene", "luminance", "triangles", "shading_normals", "sound_faces"),
+    *("textures", "emitters", "sky"),
     *("relative", "z_order"),
     *("report", "workers", "kernel", "patches", "parted", "joined"),
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.emitters import LUMINANCE
+from ..core.luminance import LUMINANCE
 from .shader_nodes import Reached, Unreadable, constant
 from .surfaces import Colour, pointwise
 

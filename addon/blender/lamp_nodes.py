@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.emitters import LUMINANCE
 from ..core.environment import Environment
+from ..core.luminance import LUMINANCE
 from ..core.scene import BRIGHTEST
 from .colour_nodes import blackbody
 from .private_render import RenderError

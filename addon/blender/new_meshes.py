@@ -11,9 +11,9 @@ from uuid import uuid4
 import bpy
 import numpy as np
 
+from .attribute_values import KINDS_OF_VALUES, read_values
 from .cut_mesh import cut_mesh
 from .read_mesh import corner_vertices
-from .rebuild_mesh import VALUES
 
 # What these do is not in the object's mesh, but for a fluid's domain: they stay on when all others are applied.
 STAY_ON = {"COLLISION", "DYNAMIC_PAINT", "FLUID", "PARTICLE_SYSTEM", "SURFACE"}
@@ -138,18 +138,18 @@ def _content(mesh):
     own = [attribute for attribute in mesh.attributes if not attribute.name.startswith(".")]
     kinds = [(attribute.name, attribute.domain, attribute.data_type) for attribute in own]
     digest.update(repr(([material and material.name_full for material in mesh.materials], kinds)).encode())
-    for values in (_values(mesh.polygons, "loop_start"), corner_vertices(mesh), *map(_attribute_values, own)):
+    for values in (
+        read_values(mesh.polygons, "loop_start", np.int32),
+        corner_vertices(mesh),
+        *map(_attribute_values, own),
+    ):
         digest.update(values.tobytes())
     return digest.hexdigest()
 
 
 def _attribute_values(attribute):
     # what cannot be read is of unknown content, the same as none
-    known = VALUES.get(attribute.data_type)
-    return np.frombuffer(uuid4().bytes, np.uint8) if known is None else _values(attribute.data, *known[:3])
-
-
-def _values(items, name, width=1, dtype=np.int32):
-    values = np.empty(len(items) * width, dtype)
-    items.foreach_get(name, values)
-    return values
+    kind = KINDS_OF_VALUES.get(attribute.data_type)
+    if kind is None:
+        return np.frombuffer(uuid4().bytes, np.uint8)
+    return read_values(attribute.data, kind.name, kind.dtype, kind.width)

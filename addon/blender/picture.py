@@ -14,6 +14,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..core.luminance import LUMINANCE
 from .as_rendered import as_rendered
 from .picture_materials import Light, LitMaterials
 from .read_mesh import BAKED_COLOURS, LIGHTMAP_LAYER
@@ -26,7 +27,6 @@ LONGER_SIDE = 960  # pixels
 MOST_BOUNCES = 512
 THROUGH = 16  # surfaces of glass, two of a pane
 MIDDLE_GREY = 0.20  # radiance that the median of the picture is exposed to: dark corners open, sun patches keep shape
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 class PictureError(ValueError):

@@ -6,18 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .attribute_values import KINDS_OF_VALUES, read_values
+
 LIGHTMAP_LAYER = "Lightmap"
 FLAT_DEG = 2.0  # at the most do flat-shaded faces of one plane meet at, in the mesh's own space: nothing parts them
-VALUES = {  # attributes that a shader takes for a colour: what holds their numbers, of which type, and how many
-    "FLOAT_COLOR": ("color", np.float32, 4),
-    "BYTE_COLOR": ("color", np.float32, 4),
-    "FLOAT_VECTOR": ("vector", np.float32, 3),
-    "FLOAT2": ("vector", np.float32, 2),
-    "FLOAT": ("value", np.float32, 1),
-    "INT": ("value", np.int32, 1),
-    "INT8": ("value", np.int32, 1),
-    "BOOLEAN": ("value", bool, 1),
-}
 BAKED_COLOURS = "Patchlight"  # the attribute that holds light, and no colour
 INFINITE = 1e15  # Blender stores an infinite coordinate as the largest float
 
@@ -60,8 +52,8 @@ class MeshArrays:
 def read_mesh(mesh, uv_layers=(), colours=()) -> MeshArrays:
     """Read a mesh; of its UV layers the render layer, "Lightmap", and those named, of its colours those named."""
     mesh.calc_loop_triangles()
-    corners = _read(mesh.loop_triangles, "loops", np.int32, 3)
-    polygons = _read(mesh.loop_triangles, "polygon_index", np.int32, 1)
+    corners = read_values(mesh.loop_triangles, "loops", np.int32, 3)
+    polygons = read_values(mesh.loop_triangles, "polygon_index", np.int32)
     is_flat = _flags(mesh, "sharp_face", len(mesh.polygons))
     edge_sharp = _sharp_corner_edges(mesh, is_flat)
     next_corner = _next_corners(mesh)
@@ -75,7 +67,7 @@ def read_mesh(mesh, uv_layers=(), colours=()) -> MeshArrays:
         corners=corners,
         polygons=polygons,
         material_slots=_material_slots(mesh)[polygons],
-        corner_normals=_read(mesh.corner_normals, "vector", np.float32, 3)[corners],
+        corner_normals=read_values(mesh.corner_normals, "vector", np.float32, 3)[corners],
         # Custom normals are bent from whatever the face has, flat faces included.
         is_flat=is_flat[polygons] & (not mesh.has_custom_normals),
         sharp_edges=is_mesh_edge & edge_sharp[corners],
@@ -101,15 +93,13 @@ def corner_vertices(mesh) -> np.ndarray:
     return _attribute(mesh, ".corner_vert", "value", np.int32, 1)
 
 
-def _read(collection, name, dtype, width):
-    values = np.empty(len(collection) * width, dtype)
-    collection.foreach_get(name, values)
-    return values if width == 1 else values.reshape(-1, width)
-
-
 def _attribute(mesh, attribute, name, dtype, width):
     found = mesh.attributes.get(attribute)
-    return np.zeros((0, width) if width > 1 else 0, dtype) if found is None else _read(found.data, name, dtype, width)
+    return (
+        np.zeros((0, width) if width > 1 else 0, dtype)
+        if found is None
+        else read_values(found.data, name, dtype, width)
+    )
 
 
 def _triangle_colours(mesh, name, is_alpha, corners, polygons):
@@ -118,8 +108,8 @@ def _triangle_colours(mesh, name, is_alpha, corners, polygons):
     found = _colour_attribute(mesh, name)
     if found is None or not _is_readable(mesh, name):
         return np.zeros((len(corners), 3), np.float32)
-    kind, dtype, width = VALUES[found.data_type]
-    values = np.nan_to_num(_read(found.data, kind, dtype, width).reshape(-1, width).astype(np.float32))
+    name, width, dtype, _ = KINDS_OF_VALUES[found.data_type]
+    values = np.nan_to_num(read_values(found.data, name, dtype, width).reshape(-1, width).astype(np.float32))
     if is_alpha:
         values = values[:, 3:] if width == 4 else np.ones_like(values[:, :1])
     values = values if values.shape[1] > 1 else np.repeat(values, 3, axis=1)
@@ -143,12 +133,12 @@ def _is_readable(mesh, name):
     found = _colour_attribute(mesh, name)
     if found is None:
         return bool(name) or not len(mesh.color_attributes)
-    return found.data_type in VALUES and found.domain in {"POINT", "CORNER", "FACE"}
+    return found.data_type in KINDS_OF_VALUES and found.domain in {"POINT", "CORNER", "FACE"}
 
 
 def _flags(mesh, attribute, count):
     found = mesh.attributes.get(attribute)
-    return np.zeros(count, bool) if found is None else _read(found.data, "value", bool, 1)
+    return np.zeros(count, bool) if found is None else read_values(found.data, "value", bool)
 
 
 def _material_slots(mesh):
@@ -158,13 +148,13 @@ def _material_slots(mesh):
 
 
 def _layer_uvs(layer):
-    return np.nan_to_num(_read(layer.uv, "vector", np.float32, 2), posinf=0.0, neginf=0.0)
+    return np.nan_to_num(read_values(layer.uv, "vector", np.float32, 2), posinf=0.0, neginf=0.0)
 
 
 def _next_corners(mesh):
     """The corner that follows each corner around its polygon."""
-    starts = _read(mesh.polygons, "loop_start", np.int32, 1)
-    sizes = _read(mesh.polygons, "loop_total", np.int32, 1)
+    starts = read_values(mesh.polygons, "loop_start", np.int32)
+    sizes = read_values(mesh.polygons, "loop_total", np.int32)
     following = np.arange(1, len(mesh.loops) + 1, dtype=np.int32)
     following[starts + sizes - 1] = starts
     return following
@@ -174,8 +164,8 @@ def _sharp_corner_edges(mesh, face_is_flat):
     """Whether the edge from each corner to the next is sharp: marked so, or where a flat-shaded face bends off."""
     edges = _attribute(mesh, ".corner_edge", "value", np.int32, 1)
     is_sharp = _flags(mesh, "sharp_edge", len(mesh.edges))
-    sizes = _read(mesh.polygons, "loop_total", np.int32, 1)
-    normals = np.repeat(_read(mesh.polygon_normals, "vector", np.float32, 3), sizes, axis=0)
+    sizes = read_values(mesh.polygons, "loop_total", np.int32)
+    normals = np.repeat(read_values(mesh.polygon_normals, "vector", np.float32, 3), sizes, axis=0)
     is_bent = _bent_edges(edges, normals, len(is_sharp))
     of_flat = edges[np.repeat(face_is_flat, sizes)]
     is_sharp[of_flat] |= is_bent[of_flat]

@@ -7,20 +7,9 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from .attribute_values import KINDS_OF_VALUES, read_values
 from .cut_faces import edge_keys
 from .read_mesh import corner_vertices
-
-# How foreach_get calls an attribute's values, how many there are, and whether a mean of them means anything.
-VALUES = {
-    "FLOAT": ("value", 1, np.float32, True),
-    "FLOAT2": ("vector", 2, np.float32, True),
-    "FLOAT_VECTOR": ("vector", 3, np.float32, True),
-    "FLOAT_COLOR": ("color", 4, np.float32, True),
-    "BYTE_COLOR": ("color", 4, np.float32, True),
-    "INT": ("value", 1, np.int32, False),
-    "INT8": ("value", 1, np.int32, False),
-    "BOOLEAN": ("value", 1, bool, False),
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +48,7 @@ def rebuild_mesh(source, origins: Origins) -> bpy.types.Mesh:
         mesh.materials.append(material)
     mesh.update(calc_edges=True)
     for attribute in source.attributes:
-        if not attribute.name.startswith(".") and attribute.data_type in VALUES:
+        if not attribute.name.startswith(".") and attribute.data_type in KINDS_OF_VALUES:
             _copy(attribute, mesh, source, origins, first_corners)
     for key in source.keys():
         mesh[key] = source[key]
@@ -76,10 +65,8 @@ def _first_corners(vertices, old_count):
 
 
 def _copy(attribute, mesh, source, origins, first_corners):
-    name, width, dtype, is_linear = VALUES[attribute.data_type]
-    old = np.empty(len(attribute.data) * width, dtype)
-    attribute.data.foreach_get(name, old)
-    old = old.reshape(-1, width)
+    name, width, dtype, is_linear = KINDS_OF_VALUES[attribute.data_type]
+    old = read_values(attribute.data, name, dtype, width).reshape(-1, width)
     if attribute.domain == "CORNER":
         new = _blended(old, origins.corners, origins.weights, is_linear)
     elif attribute.domain == "POINT":

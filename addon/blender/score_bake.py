@@ -15,6 +15,7 @@ from ..core.lightmap import bilinear
 from ..core.relative import DARK
 from ..core.scene import exitance_from_radiance
 from .as_rendered import as_rendered
+from .attribute_values import read_values
 from .files import FileError
 from .read_mesh import LIGHTMAP_LAYER
 from .rects import in_lightmap, rect_of
@@ -122,22 +123,16 @@ def _on_object(graph, object_name, matrix, part, allowed):
     values = np.full((len(part["triangle"]), 3), np.nan)
     if layer is None or image is None or not len(mesh.loop_triangles):
         return values
-    loops = _all_of(mesh.loop_triangles, "loops", np.int32, 3)
-    vertices = _all_of(mesh.loop_triangles, "vertices", np.int32, 3)
+    loops = read_values(mesh.loop_triangles, "loops", np.int32, 3)
+    vertices = read_values(mesh.loop_triangles, "vertices", np.int32, 3)
     chosen = np.minimum(part["triangle"], len(loops) - 1)
-    corners = _all_of(mesh.vertices, "co", np.float32, 3)[vertices[chosen]] @ matrix[:3, :3].T + matrix[:3, 3]
+    corners = read_values(mesh.vertices, "co", np.float32, 3)[vertices[chosen]] @ matrix[:3, :3].T + matrix[:3, 3]
     points = np.einsum("nk,nkc->nc", part["bary"], corners)
-    uvs = np.einsum("nk,nkc->nc", part["bary"], _all_of(layer.uv, "vector", np.float32, 2)[loops[chosen]])
+    uvs = np.einsum("nk,nkc->nc", part["bary"], read_values(layer.uv, "vector", np.float32, 2)[loops[chosen]])
     looked_up = bilinear(_pixels(image), in_lightmap(uvs, rect_of(original)))
     is_same = np.linalg.norm(points - part["position"], axis=1) <= allowed
     values[is_same] = looked_up[is_same]
     return values
-
-
-def _all_of(items, name, dtype, width):
-    values = np.empty(len(items) * width, dtype)
-    items.foreach_get(name, values)
-    return values.reshape(-1, width)
 
 
 def _pixels(image):

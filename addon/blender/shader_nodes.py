@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core.emitters import LUMINANCE
+from ..core.luminance import LUMINANCE
 
 GROUP_DEPTH = 8  # a tree that nests deeper is not read; Blender forbids true recursion
 

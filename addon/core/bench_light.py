@@ -10,9 +10,9 @@ import numpy as np
 from .bake import bake
 from .bench_row import BenchRow, Outcome, measured, relative_error
 from .bench_scenes import ExactScene, even_points
-from .emitters import LUMINANCE
 from .kernel import KernelScene
 from .lightmap import look_up
+from .luminance import LUMINANCE
 from .patches import subdivide
 from .radiosity import solve_patches
 from .settings import BakeSettings

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .emitters import luminance_of
 from .gaps import fill_gaps
+from .luminance import luminance_of
 from .probes import Measured
 from .relative import scale_of
 from .smoothing import TexelGrid

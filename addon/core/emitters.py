@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .environment import from_octahedron
+from .luminance import LUMINANCE
 from .scene import AreaLight, PointLight, Scene, SunLight
 from .textures import textured_colours
 from .triangles import triangle_areas
@@ -14,7 +15,6 @@ from .triangles import triangle_areas
 POINT, AREA, SUN, MESH = 0, 1, 2, 3
 LIGHT_FLOATS, PROFILE_SIDE = 24, 128  # PL_LIGHT_FLOATS, PL_PROFILE_SIDE
 PROFILE_AT = 13  # in a point's row: the number of its profile, 0 for none
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 MOST_GROUPS = 96  # groups of glowing triangles: each receiver weighs every group
 GROUP_TRIANGLES = 8  # a group of no more has a closed form in the kernel
@@ -23,11 +23,6 @@ TEXTURE_CUTS = 8  # along a side, at the most
 MOST_PIECES = 1 << 20  # of all triangles, about: where there are many, each is cut into fewer
 MOST_FINER = 8  # points along a piece's side, at the most
 TEXTURE_LOOKUPS = 1 << 22  # of all points, at the most
-
-
-def luminance_of(light):
-    """The luminance (...) of light (..., 3), as exact as that is: of many float32 no copies in float64 are made."""
-    return light @ LUMINANCE.astype(light.dtype)
 
 
 @dataclass(frozen=True, slots=True)

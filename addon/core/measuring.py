@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .direct_light import shadow_samples
-from .emitters import LUMINANCE
 from .gather_job import REPLICATES, GatherJob
+from .luminance import LUMINANCE
 from .probes import Measured, Probes, chosen_values
 from .relative import scale_of
 from .smoothing import TexelGrid

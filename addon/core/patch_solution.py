@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .emitters import LUMINANCE, Emitters, with_sources
+from .emitters import Emitters, with_sources
 from .kernel import KernelScene
+from .luminance import LUMINANCE
 from .parted import is_parted
 from .patches import Patches, patch_triangles
 from .scene import Scene, radiance_from_exitance

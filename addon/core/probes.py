@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .emitters import LUMINANCE
 from .lookup import bilinear
+from .luminance import LUMINANCE
 from .receivers import Receivers, surface_receivers
 from .relative import scale_of
 from .scene import Scene

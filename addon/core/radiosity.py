@@ -10,11 +10,12 @@ from .choose import EXCHANGE_TRIANGLES, choose, mean_reflectance
 from .conjugate_gradient import EXCHANGE_LIMIT, require_exchange_size, solve_conjugate_gradient
 from .decomposition import finer
 from .dense import DIRECT_LIMIT, require_direct_size, solve_direct
-from .emitters import LUMINANCE, Emitters
+from .emitters import Emitters
 from .exchange import exchange_of
 from .joined import joined
 from .kernel import KernelScene
 from .laws import Laws, measured_laws
+from .luminance import LUMINANCE
 from .parted import finer_where_parted
 from .patch_light import QUICK_ERROR, PatchLight, measure_patches
 from .patch_solution import PatchSolution, reaches_of, side_kinds, with_bright_sides

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .emitters import luminance_of
+from .luminance import luminance_of
 
 DARK = 0.3  # of the median irradiance: what is added to a point's own before its error is called relative
 

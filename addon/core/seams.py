@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .emitters import luminance_of
+from .luminance import luminance_of
 
 STAY = 0.05  # is what a texel's change costs beside a difference between the sides, both by the light there. So a
 # thirtieth of differences is left; were it less, texels would swing to and fro along the seam

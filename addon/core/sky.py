@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from .emitters import LUMINANCE
 from .environment import Environment, from_octahedron
+from .luminance import LUMINANCE
 from .scene import Scene, SunLight, exitance_from_radiance
 
 SIDE = 128  # of the map that rays look up, about a degree a texel: what is finer no diffuse surface shows

@@ -12,9 +12,9 @@ from typing import ClassVar
 import numpy as np
 
 from .charts import Charts
-from .emitters import luminance_of
 from .gather_sums import LARGEST_VARIANCE
 from .kernel import clamp_outliers, smooth
+from .luminance import luminance_of
 from .receivers import Receivers
 from .scene import Scene
 from .seams import NO_SEAMS, Seams

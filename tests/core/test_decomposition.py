@@ -6,9 +6,10 @@ import pytest
 from addon.core import patches as patches_of_one_size
 from addon.core import radiosity
 from addon.core.decomposition import MOST_ALONG, finer, patches_at
-from addon.core.emitters import LUMINANCE, emitters_of
+from addon.core.emitters import emitters_of
 from addon.core.gather_sums import no_sums
 from addon.core.guides import no_guides
+from addon.core.luminance import LUMINANCE
 from addon.core.patches import cut, grid_of, patch_size_for
 from addon.core.receivers import surface_receivers
 from addon.core.relative import scale_of

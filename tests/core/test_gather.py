@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.direct_light import shadow_samples
-from addon.core.emitters import LUMINANCE
+from addon.core.luminance import LUMINANCE
 from addon.core.receivers import surface_receivers
 from addon.core.scene import AreaLight
 from addon.core.settings import BakeSettings

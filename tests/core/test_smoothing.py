@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from addon.core.emitters import LUMINANCE
 from addon.core.gather_sums import GatherSums
 from addon.core.kernel import clamp_outliers, smooth
+from addon.core.luminance import LUMINANCE
 from addon.core.receivers import Receivers
 from addon.core.relative import scale_of
 from addon.core.smoothing import BAND, KEPT, MOST_KEPT, TexelGrid, _around, restoring

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.emitters import LUMINANCE, emitters_of
+from addon.core.emitters import emitters_of
 from addon.core.gather_job import GatherJob
 from addon.core.guides import no_guides
+from addon.core.luminance import LUMINANCE
 from addon.core.patch_solution import EVEN, LIGHT
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import surface_receivers

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.emitters import LUMINANCE, emitters_of
+from addon.core.emitters import emitters_of
 from addon.core.environment import Environment
+from addon.core.luminance import LUMINANCE
 from addon.core.receivers import surface_receivers
 from addon.core.scene import AreaLight, Material, PointLight, SunLight
 from tests.physics.lighting import SINGLE, direct_light, floor, floor_receivers, full_light, random_points

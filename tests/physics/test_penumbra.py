@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from addon.core.emitters import LUMINANCE
+from addon.core.luminance import LUMINANCE
 from addon.core.scene import AreaLight, Material
 from tests.physics.lighting import direct_light
 from tests.reference.polygon import point_to_polygon

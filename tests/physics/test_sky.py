@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from addon.core.emitters import LUMINANCE, emitters_of
+from addon.core.emitters import emitters_of
 from addon.core.environment import Environment
 from addon.core.gather_sums import no_sums
 from addon.core.guides import no_guides
+from addon.core.luminance import LUMINANCE
 from addon.core.patch_solution import EVEN, PatchSolution
 from addon.core.patches import subdivide
 from addon.core.receivers import Receivers

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from addon.core.bake import bake
-from addon.core.emitters import LUMINANCE
 from addon.core.lightmap import look_up
+from addon.core.luminance import LUMINANCE
 from addon.core.patches import subdivide
 from addon.core.scene import AreaLight, Material
 from addon.core.settings import BakeSettings
