@@ -89,14 +89,9 @@ def settings_from(args: argparse.Namespace) -> BakeSettings:
 def run_bake(args: argparse.Namespace) -> None:
     """``patchlight bake``: open, read, bake, write, save; files appear only when all of the bake has succeeded."""
     settings = settings_from(args)
-    if args.exr and args.target != "lightmap":
-        raise CommandError("--exr writes the lightmap: it needs --target lightmap")
-    if args.smooth_angle is not None and args.target != "vertex":
-        raise CommandError("--smooth-angle is of vertex colours: it needs --target vertex")
     output = args.output or args.input.with_name(f"{args.input.stem}_baked.blend")
     exr = args.exr / f"{output.stem}.exr" if args.exr else None
-    if args.report and args.report.resolve() in {path.resolve() for path in (args.input, output, exr) if path}:
-        raise CommandError(f"--report {args.report} is another file of this bake: it needs one of its own")
+    _require_sense(args, output, exr)
     seconds: dict[str, float] = {}
     with with_blender() as bpy, ProgressBar() as progress:
         from .blender import bake_scene, files
@@ -125,6 +120,15 @@ def run_bake(args: argparse.Namespace) -> None:
             if exr:  # last: what fails here loses nothing else
                 _save_exr(prepared, exr)
     _tell(args.input, output, report)
+
+
+def _require_sense(args, output, exr):
+    if args.exr and args.target != "lightmap":
+        raise CommandError("--exr writes the lightmap: it needs --target lightmap")
+    if args.smooth_angle is not None and args.target != "vertex":
+        raise CommandError("--smooth-angle is of vertex colours: it needs --target vertex")
+    if args.report and args.report.resolve() in {path.resolve() for path in (args.input, output, exr) if path}:
+        raise CommandError(f"--report {args.report} is another file of this bake: it needs one of its own")
 
 
 def _require_writable(output, args):

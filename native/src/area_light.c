@@ -22,8 +22,7 @@ typedef struct lamp_part {
     float low_u, high_u, low_v, high_v;
 } lamp_part;
 
-/* Of a narrow beam only what is nearest shines at the point: a disc about its foot on the lamp, and a box about that.
- */
+/* Of a narrow beam what shines at the point is a disc about its foot on the lamp: here, a box about that disc. */
 static bool part_in_reach(const area_light *light, vec3 point, lamp_part *out) {
     *out = (lamp_part){-1, 1, -1, 1};
     if (is_wide(light))
@@ -61,9 +60,7 @@ bool area_faces(const area_light *light, vec3 point) {
     return vec3_dot(vec3_sub(point, light->centre), normal) > 0;
 }
 
-bool area_is_exact(const area_light *light) {
-    return light->is_ellipse <= 0 && 0.5f * light->spread >= 0.5f * PL_PI - 1e-3f;
-}
+bool area_is_exact(const area_light *light) { return light->is_ellipse <= 0 && is_wide(light); }
 
 float area_of_lamp(const area_light *light) {
     const float rectangle = 4 * vec3_length(vec3_cross(light->axis_u, light->axis_v));
