@@ -79,7 +79,7 @@ def affordable(scene, asked):
     """
     sound = sound_faces(scene).scene
     wanted = np.array([obj.is_target for obj in sound.objects for _ in range(obj.count)], bool)
-    areas = triangle_areas(sound)
+    areas = triangle_areas(sound.corners)
     texels = areas[wanted].sum() * (asked.density or 0) ** 2
     if 1e4 < texels < 4 * MOST_TEXELS:
         asked = replace(asked, density=None)
