@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+RIM = np.radians(60.0)  # edges that bend by more are sharp, whatever is smooth around them
+
 
 @dataclass(frozen=True, slots=True)
 class Shape:
@@ -171,6 +173,7 @@ def add_object(name, form, *materials):
         mesh.materials.append(entry)
     mesh.polygons.foreach_set("material_index", form.slots)
     mesh.update()
+    mesh.set_sharp_from_angle(angle=RIM)
     obj = bpy.data.objects.new(name, mesh)
     bpy.context.scene.collection.objects.link(obj)
     return obj

@@ -14,6 +14,7 @@ from .ranges import LARGEST_COORDINATE
 from .scene import Scene
 from .shading_normals import STEEPEST, without_steep_normals
 
+MOST_NAMES = 3  # of objects in one sentence
 # Twice the area over the two sides' lengths: the sine between them. Below this it is rounding, in float32 (scene.c).
 LEAST_SINE = np.float32(2.4e-7)
 
@@ -139,15 +140,20 @@ def _finite_attributes(scene):
 
 def _with_gentle_normals(scene):
     normals, is_changed = without_steep_normals(scene)
-    warnings = [_edge_warning(obj, int(is_changed[obj.span].sum())) for obj in scene.objects]
-    return replace(scene, corner_normals=normals), warnings
+    names = [obj.name for obj in scene.objects if is_changed[obj.span].any()]
+    return replace(scene, corner_normals=normals), _edge_warnings(names, int(is_changed.sum()))
 
 
-def _edge_warning(obj, count):
-    return count and (
-        f"object {obj.name}: {count} of {obj.count} triangles have shading normals more than {STEEPEST:g} degrees off "
-        "a face, as over sharp edges: they are baked with those of the faces around them, without such edges"
-    )
+def _edge_warnings(names, count):
+    """One for all objects: they may be many, as whole scenes are shaded smooth by a click."""
+    if not names:
+        return []
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return [
+        f"{'object' if len(names) == 1 else 'objects'} {', '.join(names[:MOST_NAMES])}{more}: {count} triangles have "
+        f"shading normals more than {STEEPEST:g} degrees off a face, as over sharp edges: they are baked with those of "
+        "the faces around them, without such edges"
+    ]
 
 
 def _attribute_warning(obj, what, is_bad):
