@@ -18,22 +18,19 @@ static inline pl_receiver_frame receiver_frame(const pl_scene *scene, const pl_r
     const double *p = receivers->positions + 3 * index;
     pl_receiver_frame frame = {.triangle = receivers->triangle_sides[index] / 2,
                                .side = receivers->triangle_sides[index] & 1};
-    const vec3 point = {(float)(p[0] - scene->centre[0]), (float)(p[1] - scene->centre[1]),
-                        (float)(p[2] - scene->centre[2])};
+    vec3 point = {(float)(p[0] - scene->centre[0]), (float)(p[1] - scene->centre[1]), (float)(p[2] - scene->centre[2])};
     frame.geometric = vec3_scale(scene_normal(scene, frame.triangle), frame.side ? -1.0f : 1.0f);
     frame.shading = vec3_from(receivers->normals + 3 * index);
     frame.is_smooth = vec3_dot(frame.geometric, frame.shading) < 0.99999f;
     if (!frame.is_smooth)
         frame.shading = frame.geometric;
-    frame.origin = point_off_triangle(scene, frame.triangle, point, frame.geometric);
     frame.lift = (vec3){0, 0, 0};
     if (frame.is_smooth) {
         const vec3 corner = scene_vertex(scene, frame.triangle, 0);
-        const vec3 flat = vec3_mul_add(frame.geometric, -vec3_dot(vec3_sub(point, corner), frame.geometric), point);
-        const vec3 lifted = frame.origin;
-        frame.origin = point_off_triangle(scene, frame.triangle, flat, frame.geometric);
-        frame.lift = vec3_sub(lifted, frame.origin);
+        frame.lift = vec3_scale(frame.geometric, vec3_dot(vec3_sub(point, corner), frame.geometric));
+        point = vec3_sub(point, frame.lift);
     }
+    frame.origin = point_off_triangle(scene, frame.triangle, point, frame.geometric);
     return frame;
 }
 

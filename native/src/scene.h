@@ -48,11 +48,12 @@ static inline vec3 scene_point(const pl_scene *scene, int32_t triangle, float we
     return vec3_mul_add(b, weight_1, vec3_mul_add(c, weight_2, a));
 }
 
+static const float half_ulp = 2.98023223876953e-8f; /* half a unit in the last place of a number of size 1 */
+
 /*
  * How far a ray may find a triangle off its plane, as it does along slivers: of the normal, a product of two edges, a
  * rounding of theirs is left, which a height much less than the length makes much of. No more than twice that height.
  */
-static const float half_ulp = 2.98023223876953e-8f;
 static inline float sliver_rounding(vec3 a, vec3 b, vec3 c) {
     const vec3 ab = vec3_sub(b, a), ac = vec3_sub(c, a), bc = vec3_sub(c, b);
     const float longest = sqrtf(greater(vec3_dot(ab, ab), greater(vec3_dot(ac, ac), vec3_dot(bc, bc))));
