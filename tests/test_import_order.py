@@ -14,9 +14,10 @@ MAY_IMPORT = {"ui": {"ui", "blender", "core"}, "blender": {"blender", "core"}, "
 # a module of core imports only from those to the left of it
 CORE_ORDER = (
     *("ranges", "settings", "environment", "scene", "luminance", "triangles", "shading_normals", "sound_faces"),
+    *("workers", "kernel"),
     *("textures", "emitters", "sky"),
     *("relative", "z_order"),
-    *("report", "workers", "kernel", "patches", "parted", "joined"),
+    *("report", "patches", "parted", "joined"),
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
     *("transport", "aimed", "hemicube", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from .environment import from_octahedron
+from .kernel import AREA, EXACT_TRIANGLES, LIGHT_FLOATS, MESH, POINT, PROFILE_SIDE, SUN
 from .luminance import LUMINANCE
 from .scene import AreaLight, PointLight, Scene, SunLight
 from .textures import textured_colours
 from .triangles import triangle_areas
 
-POINT, AREA, SUN, MESH = 0, 1, 2, 3
-LIGHT_FLOATS, PROFILE_SIDE = 24, 128  # PL_LIGHT_FLOATS, PL_PROFILE_SIDE
 PROFILE_AT = 13  # in a point's row: the number of its profile, 0 for none
 
 MOST_GROUPS = 96  # groups of glowing triangles: each receiver weighs every group
-GROUP_TRIANGLES = 8  # a group of no more has a closed form in the kernel
 # A triangle whose glow is an image is cut into pieces, each with the mean of what the image has at many points of it.
 TEXTURE_CUTS = 8  # along a side, at the most
 MOST_PIECES = 1 << 20  # of all triangles, about: where there are many, each is cut into fewer
@@ -183,7 +181,7 @@ def _groups(corners, radiances):
         waiting.sort(key=lambda group: flux[group].sum())
         group = waiting.pop()
         extent = np.ptp(middles[group], axis=0)
-        if len(group) <= GROUP_TRIANGLES or len(waiting) + len(done) + 2 > MOST_GROUPS or extent.max() <= 0:
+        if len(group) <= EXACT_TRIANGLES or len(waiting) + len(done) + 2 > MOST_GROUPS or extent.max() <= 0:
             done.append(group)
             continue
         ranked = group[np.argsort(middles[group, np.argmax(extent)], kind="stable")]

@@ -21,8 +21,13 @@ except ImportError as error:  # a source tree that has not been built, or a zip 
 
 ROWS = 16  # of a lightmap are smoothed at once, where neighbours are a texel apart
 NO_OWNERS = np.zeros(0, np.int32)  # of pieces: each is a patch
-RAYS_STOP, RAYS_MISS, SHADOWS_MISS, MAP_EXTENDS, FRONT_OPEN, BACK_OPEN = 1, 2, 4, 8, 16, 32  # pl_clear_flags
-GUIDE_CELLS = 64  # PL_GUIDE_CELLS of native/include/patchlight.h
+
+# Numbers of native/include/patchlight.h.
+POINT, AREA, SUN, MESH = _kernel.PL_LIGHT_POINT, _kernel.PL_LIGHT_AREA, _kernel.PL_LIGHT_SUN, _kernel.PL_LIGHT_MESH
+LIGHT_FLOATS, PROFILE_SIDE = _kernel.PL_LIGHT_FLOATS, _kernel.PL_PROFILE_SIDE
+EXACT_TRIANGLES, MANY_LIGHTS = _kernel.PL_EXACT_TRIANGLES, _kernel.PL_MANY_LIGHTS
+EVEN_SIDE, MIXED_SIDE, LIGHT_SIDE = _kernel.PL_SIDE_EVEN, _kernel.PL_SIDE_MIXED, _kernel.PL_SIDE_LIGHT
+GUIDE_CELLS = _kernel.PL_GUIDE_CELLS
 
 LIBRARY_PATTERNS = {
     "linux": ("../embreex.libs/libembree4*.so*",),
@@ -225,12 +230,12 @@ def _clear(scene: Scene):
 def _clear_flags(material):
     """A sum of pl_clear_flags."""
     flags = {
-        RAYS_STOP: material.stops_light,
-        RAYS_MISS: not material.meets_light,
-        SHADOWS_MISS: not material.meets_shadow_rays,
-        MAP_EXTENDS: material.textures_extend,
-        FRONT_OPEN: material.open_side == "front",
-        BACK_OPEN: material.open_side == "back",
+        _kernel.PL_RAYS_STOP: material.stops_light,
+        _kernel.PL_RAYS_MISS: not material.meets_light,
+        _kernel.PL_SHADOWS_MISS: not material.meets_shadow_rays,
+        _kernel.PL_MAP_EXTENDS: material.textures_extend,
+        _kernel.PL_FRONT_OPEN: material.open_side == "front",
+        _kernel.PL_BACK_OPEN: material.open_side == "back",
     }
     return sum(flag for flag, is_set in flags.items() if is_set)
 

@@ -9,8 +9,8 @@ import numpy as np
 from .emitters import Emitters
 from .gather_sums import no_sums
 from .guides import no_guides
-from .kernel import KernelScene
-from .patch_solution import EVEN, PatchSolution
+from .kernel import EVEN_SIDE, KernelScene
+from .patch_solution import PatchSolution
 from .patches import Patches
 from .receivers import patch_receivers
 from .scene import Scene
@@ -97,7 +97,7 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, coun
         radiosity=np.zeros((kernel.side_count, 3), np.float32),
         direct=np.zeros((kernel.side_count, 3), np.float32),
         reflectance=np.zeros((2 * len(patches), 3), np.float32),
-        kinds=np.full(kernel.side_count, EVEN, np.uint8),
+        kinds=np.full(kernel.side_count, EVEN_SIDE, np.uint8),
         reaches=np.zeros(kernel.side_count, np.float32),
         sky=sky,
     )

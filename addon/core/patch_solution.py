@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .emitters import Emitters, with_sources
-from .kernel import KernelScene
+from .kernel import EVEN_SIDE, LIGHT_SIDE, MIXED_SIDE, KernelScene
 from .luminance import LUMINANCE
 from .parted import is_parted
 from .patches import Patches, patch_triangles
 from .scene import Scene, radiance_from_exitance
 from .triangles import triangle_areas
 
-EVEN, MIXED_SIDE, LIGHT = 0, 1, 2  # kinds of sides, as the kernel has them
 MIXED = 0.5  # of the radiosity: more spread of reflected direct light over a side is sampled anew by gather rays
 BRIGHT = 20.0  # times the median radiosity: brighter sides are sampled as lights, which few gather rays would find
 BRIGHT_SHARE = 0.005  # of all area that they may be: where much is bright, gather rays find it well
@@ -75,7 +74,8 @@ def side_kinds(patches, radiosity, spread, is_confined):
     flux = luminance * patches.side_areas * ~is_confined
     if flux[is_bright].sum() < BRIGHT_FLUX * flux.sum():
         is_bright[:] = False
-    return np.where(is_bright, LIGHT, np.where(is_mixed, MIXED_SIDE, EVEN)).astype(np.uint8), np.flatnonzero(is_bright)
+    kinds = np.where(is_bright, LIGHT_SIDE, np.where(is_mixed, MIXED_SIDE, EVEN_SIDE))
+    return kinds.astype(np.uint8), np.flatnonzero(is_bright)
 
 
 def reaches_of(scene: Scene, kernel: KernelScene, patches: Patches, seed: int):

@@ -13,7 +13,7 @@ from .dense import DIRECT_LIMIT, require_direct_size, solve_direct
 from .emitters import Emitters
 from .exchange import exchange_of
 from .joined import joined
-from .kernel import KernelScene
+from .kernel import MANY_LIGHTS, KernelScene
 from .laws import Laws, measured_laws
 from .luminance import LUMINANCE
 from .parted import finer_where_parted
@@ -41,7 +41,6 @@ ROUND_SHARES = (0.25, 0.75)  # of the budget is what each round of such cuts may
 # Where a lightmap has texels on nearly all of the scene, looks from texel to texel mend what patches have wrong.
 MOST_AREA = 0.9  # of the scene's area: so much must have texels
 LIGHTMAP_ERROR = QUICK_ERROR  # is then good enough for patches, if not a larger one is, and small patches are joined
-MANY_LIGHTS = 64  # lights (as in native/src/gather.c): rays that go on take patches' direct light, which is not mended
 
 # How many rays the solvers take.
 USUAL_ERROR = 0.05  # the stochastic solver's rays are those below at this error, and more by the ratio at a smaller one
@@ -89,6 +88,7 @@ class Solved:
 
 def solve_radiosity(scene: Scene, kernel: KernelScene, emitters: Emitters, settings: BakeSettings, on_step) -> Solved:
     """Subdivide, measure direct light on the patches, solve for the light that bounces."""
+    # with more lights, rays that go on take patches' direct light, which is not mended
     is_rough = settings.target == "lightmap" and _target_share(scene) >= MOST_AREA and len(emitters) < MANY_LIGHTS
     light = scene, kernel, emitters, sky_map(scene), settings
     # half of the bar is kept for solving once more

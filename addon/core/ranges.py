@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-LARGEST_COORDINATE = (
-    1e8  # [m] from the origin, eight Earths: its fourth power, and that of what lies between, is a float
-)
+# [m] from the origin, eight Earths: its fourth power, and that of what lies between, is a float. The kernel's, too.
+LARGEST_COORDINATE = 1e8
 BRIGHTEST = 1e15  # of any light's radiance, intensity or irradiance, in its unit: its square is a float
 
 

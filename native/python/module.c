@@ -222,7 +222,29 @@ static PyMethodDef methods[] = {
     {NULL, NULL, 0, NULL},
 };
 
-static PyModuleDef_Slot slots[] = {{0, NULL}};
+/* The header's numbers that Python needs, under their own names: nobody writes them out a second time. */
+static int add_constants(PyObject *module) {
+    static const struct {
+        const char *name;
+        long value;
+    } constants[] = {
+#define CONSTANT(name) {#name, (long)name}
+        CONSTANT(PL_RAYS_STOP),          CONSTANT(PL_RAYS_MISS),       CONSTANT(PL_SHADOWS_MISS),
+        CONSTANT(PL_MAP_EXTENDS),        CONSTANT(PL_FRONT_OPEN),      CONSTANT(PL_BACK_OPEN),
+        CONSTANT(PL_LIGHT_POINT),        CONSTANT(PL_LIGHT_AREA),      CONSTANT(PL_LIGHT_SUN),
+        CONSTANT(PL_LIGHT_MESH),         CONSTANT(PL_LIGHT_FLOATS),    CONSTANT(PL_PROFILE_SIDE),
+        CONSTANT(PL_SIDE_EVEN),          CONSTANT(PL_SIDE_MIXED),      CONSTANT(PL_SIDE_LIGHT),
+        CONSTANT(PL_GUIDE_CELLS),        CONSTANT(PL_EXACT_TRIANGLES), CONSTANT(PL_MANY_LIGHTS),
+        CONSTANT(PL_LARGEST_COORDINATE),
+#undef CONSTANT
+    };
+    for (size_t k = 0; k < sizeof constants / sizeof *constants; ++k)
+        if (PyModule_AddIntConstant(module, constants[k].name, constants[k].value) < 0)
+            return -1;
+    return 0;
+}
+
+static PyModuleDef_Slot slots[] = {{Py_mod_exec, (void *)add_constants}, {0, NULL}};
 
 static PyModuleDef definition = {
     .m_base = PyModuleDef_HEAD_INIT,

@@ -6,7 +6,7 @@
 #include "polygon.h"
 
 /* Above the horizon a triangle leaves 2, and a rectangle, which is a lamp by itself, MAX_CLIPPED - 2 of them. */
-enum { MOST_RISEN = 2 * EXACT_TRIANGLES };
+enum { MOST_RISEN = 2 * PL_EXACT_TRIANGLES };
 _Static_assert(MAX_CLIPPED - 2 <= MOST_RISEN, "a rectangle has room");
 
 /* A piece of a lamp's face above the horizon. */
@@ -27,7 +27,7 @@ typedef struct aimed_light {
     const pl_lights *lights;
     size_t light;
     vec3 point, normal;
-    light_face faces[EXACT_TRIANGLES];
+    light_face faces[PL_EXACT_TRIANGLES];
     size_t face_count; /* 0: it has no closed form */
     enum { BY_LIGHT, BY_AREA, BY_ANGLE } way;
     size_t count;

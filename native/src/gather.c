@@ -15,8 +15,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* With more lights the shadow of any one matters little, and looking at all of them costs more than the ray. */
-enum { MANY_LIGHTS = 64 };
 enum { MOST_STEPS = 64 }; /* of a ray caught between surfaces that touch; then a mean has to do */
 
 typedef struct gather_job {
@@ -137,7 +135,7 @@ static void gather_ray(gather_job *job, const pl_receiver_frame *frame, vec3 dir
             add(io_sum, has_texel ? texel : solution->radiosity + 3 * side, weight);
             return;
         }
-        skips_lights = is_mixed || ((has_texel || goes_on) && job->lights->count < MANY_LIGHTS);
+        skips_lights = is_mixed || ((has_texel || goes_on) && job->lights->count < PL_MANY_LIGHTS);
         if (skips_lights)
             sample_direct(job, &hit, side, &random, weight, io_sum);
         else

@@ -4,8 +4,6 @@
 
 #include "lights.h"
 
-enum { EXACT_TRIANGLES = 8 }; /* a mesh light of no more is summed exactly: Lambert's formula is 0.2 us */
-
 /* A flat piece of a lamp, of 3 or 4 corners, as a point sees it: of no radiance where that is its dark side. */
 typedef struct light_face {
     vec3 corners[4];
@@ -63,7 +61,7 @@ static inline bool light_is_shadowless(const pl_lights *lights, size_t light) {
 }
 
 /* The flat pieces of a lamp whose light has a closed form: how many, 0 of one that has none. */
-size_t light_faces(const pl_lights *lights, size_t light, vec3 point, light_face out_faces[EXACT_TRIANGLES]);
+size_t light_faces(const pl_lights *lights, size_t light, vec3 point, light_face out_faces[PL_EXACT_TRIANGLES]);
 
 /* Add what arrives of a face, unoccluded. */
 void add_face(const light_face *face, vec3 point, vec3 normal, float io_rgb[3]);

@@ -21,7 +21,7 @@ bool light_is_sharp(const pl_lights *lights, size_t light) {
     return (lights->kinds[light] == PL_LIGHT_POINT || lights->kinds[light] == PL_LIGHT_SUN) && p[6] <= 0;
 }
 
-size_t light_faces(const pl_lights *lights, size_t light, vec3 point, light_face out_faces[EXACT_TRIANGLES]) {
+size_t light_faces(const pl_lights *lights, size_t light, vec3 point, light_face out_faces[PL_EXACT_TRIANGLES]) {
     const float *p = parameters_of(lights, light);
     if (lights->kinds[light] == PL_LIGHT_AREA) {
         const area_light lamp = area_of(p);
@@ -33,7 +33,7 @@ size_t light_faces(const pl_lights *lights, size_t light, vec3 point, light_face
     if (lights->kinds[light] != PL_LIGHT_MESH)
         return 0;
     const mesh_light lamp = mesh_of(p);
-    if (lamp.count > EXACT_TRIANGLES)
+    if (lamp.count > PL_EXACT_TRIANGLES)
         return 0;
     for (size_t k = 0; k < lamp.count; ++k)
         out_faces[k] = mesh_face(lights, lamp.first + k, point);

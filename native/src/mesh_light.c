@@ -36,7 +36,7 @@ static float from_middle(const light_face *face, vec3 point, vec3 normal) {
 float mesh_importance(const pl_lights *lights, const float *p, vec3 point, vec3 normal, float ball) {
     const mesh_light light = mesh_of(p);
     const vec3 to = vec3_sub(light.centre, point);
-    if (light.count > EXACT_TRIANGLES || vec3_dot(to, to) > 16 * light.radius * light.radius)
+    if (light.count > PL_EXACT_TRIANGLES || vec3_dot(to, to) > 16 * light.radius * light.radius)
         return ball;
     float guessed = 0, rgb[3] = {0, 0, 0};
     for (size_t t = light.first; t < light.first + light.count; ++t) {

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from addon.core.emitters import AREA, LIGHT_FLOATS, MESH, MOST_GROUPS, POINT, SUN, TEXTURE_CUTS, emitters_of
+from addon.core.emitters import MOST_GROUPS, TEXTURE_CUTS, emitters_of
+from addon.core.kernel import AREA, LIGHT_FLOATS, MESH, POINT, SUN
 from addon.core.scene import AreaLight, Material, PointLight, SunLight, Texture
 from tests.scenes import BLACK, cornell_box, lamp, rectangle, scene_of
 

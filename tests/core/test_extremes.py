@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from addon.core import _kernel, ranges
 from addon.core.bake import bake
 from addon.core.emitters import emitters_of
 from addon.core.patches import subdivide
@@ -13,6 +14,10 @@ from tests.physics.lighting import SINGLE, direct_light, floor
 from tests.scenes import Part, closed_box, cube_room, kernel_of, lamp, scene_of
 
 QUICK = {"target": "vertex", "error": 0.3, "patch_size": 0.5, "threads": 2}
+
+
+def test_scene_and_kernel_agree_how_far_the_world_goes():
+    assert ranges.LARGEST_COORDINATE == _kernel.PL_LARGEST_COORDINATE
 
 
 @pytest.mark.parametrize("radius", [1e-30, 1e-12, 1e-6])

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from addon.core import _kernel
-from addon.core.emitters import LIGHT_FLOATS, PROFILE_SIDE
-from addon.core.kernel import embree
+from addon.core.kernel import LIGHT_FLOATS, PROFILE_SIDE, embree
 from addon.core.luminance import LUMINANCE
 from addon.core.texel_light import packed
 from tests.random_scenes import placed_meshes

@@ -6,7 +6,8 @@ import pytest
 from addon.core.emitters import emitters_of
 from addon.core.gather_sums import no_sums
 from addon.core.guides import no_guides
-from addon.core.patch_solution import EVEN, PatchSolution
+from addon.core.kernel import EVEN_SIDE
+from addon.core.patch_solution import PatchSolution
 from addon.core.patches import subdivide
 from addon.core.receivers import surface_receivers
 from addon.core.settings import BakeSettings
@@ -59,8 +60,8 @@ def gathered_in_a_box(light, is_split):
         patches = subdivide(scene, kernel, 0.5, 1000, 0)
         dark, count = np.zeros((2 * len(patches), 3), np.float32), 16
         field = PatchSolution(
-            dark, dark, patches.side_reflectance, np.full(len(dark), EVEN, np.uint8), np.zeros(len(dark), np.float32),
-            np.zeros((1, 3), np.float32),
+            dark, dark, patches.side_reflectance, np.full(len(dark), EVEN_SIDE, np.uint8),
+            np.zeros(len(dark), np.float32), np.zeros((1, 3), np.float32),
         )  # fmt: skip
         sums = no_sums(len(receivers), 1)
         everyone = np.arange(len(receivers), dtype=np.uint32)

@@ -8,8 +8,8 @@ import pytest
 from addon.core.emitters import emitters_of
 from addon.core.gather_job import GatherJob
 from addon.core.guides import no_guides
+from addon.core.kernel import EVEN_SIDE, LIGHT_SIDE
 from addon.core.luminance import LUMINANCE
-from addon.core.patch_solution import EVEN, LIGHT
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import surface_receivers
 from addon.core.scene import Material, PointLight
@@ -49,12 +49,12 @@ def test_bright_sides_as_lights_give_what_rays_find_of_them(has_texels, scene):
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, BakeSettings(error=0.02), lambda done: None)
         patches = solved.patches
-        assert (patches.kinds == LIGHT).any()
+        assert (patches.kinds == LIGHT_SIDE).any()
         receivers, light = texels_of(scene)
         weights, nowhere = np.ones(len(receivers), np.float32), no_guides(len(receivers))
         job = GatherJob(kernel, solved, receivers, weights, nowhere, light if has_texels else NO_TEXEL_LIGHT)
         job = job.part(np.arange(0, len(receivers), 8))
-        unlit = replace(patches, kinds=np.where(patches.kinds == LIGHT, EVEN, patches.kinds).astype(np.uint8))
+        unlit = replace(patches, kinds=np.where(patches.kinds == LIGHT_SIDE, EVEN_SIDE, patches.kinds).astype(np.uint8))
 
         def light_of(job, rays):
             return (job.direct(256, 1)[0] + job.gathered(rays, 2)[0]) @ LUMINANCE

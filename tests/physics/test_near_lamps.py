@@ -8,7 +8,7 @@ import pytest
 from addon.core.emitters import emitters_of
 from addon.core.gather_job import GatherJob
 from addon.core.guides import no_guides
-from addon.core.patch_solution import MIXED_SIDE
+from addon.core.kernel import MIXED_SIDE
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
 from addon.core.scene import AreaLight, Material

@@ -9,8 +9,9 @@ from addon.core.emitters import emitters_of
 from addon.core.environment import Environment
 from addon.core.gather_sums import no_sums
 from addon.core.guides import no_guides
+from addon.core.kernel import EVEN_SIDE
 from addon.core.luminance import LUMINANCE
-from addon.core.patch_solution import EVEN, PatchSolution
+from addon.core.patch_solution import PatchSolution
 from addon.core.patches import subdivide
 from addon.core.receivers import Receivers
 from addon.core.scene import SunLight
@@ -84,7 +85,7 @@ def gathered(scene, receivers, sky, rays):
         patches = subdivide(scene, kernel, 10.0, 16, 0)
         nothing, sides = np.zeros((2 * len(patches), 3), np.float32), 2 * len(patches)
         field = PatchSolution(
-            nothing, nothing, nothing, np.full(sides, EVEN, np.uint8), np.zeros(sides, np.float32), sky
+            nothing, nothing, nothing, np.full(sides, EVEN_SIDE, np.uint8), np.zeros(sides, np.float32), sky
         )
         sums = no_sums(len(receivers), 1)
         everyone = np.arange(len(receivers), dtype=np.uint32)
