@@ -63,10 +63,10 @@ def learn_guides(
     moments, rays = kernel.learn_guides(
         solution, texel_light, emitters, receivers, members, first_members, LEARNING_RAYS, seed
     )
-    return Guides(groups, _shares(moments)), rays
+    return Guides(groups, guide_shares(moments)), rays
 
 
-def _shares(moments):
+def guide_shares(moments):
     """The density that makes the variance least is the root of the mean square [Kahn & Marshall 1953]."""
     # squares of what is as bright as may be leave float32
     roots = np.sqrt(np.minimum(moments, np.finfo(np.float32).max).astype(np.float64))

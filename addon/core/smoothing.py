@@ -137,7 +137,7 @@ def restoring(grid: TexelGrid, before, luminance, deviations):
     What noise is common to both falls out of their difference. Charts that lie side by side share what they lost: calm
     ones get little of it.
     """
-    given, shares = _around(grid, before - luminance), np.maximum(_around(grid, deviations), deviations)
+    given, shares = sums_around(grid, before - luminance), np.maximum(sums_around(grid, deviations), deviations)
     np.divide(deviations, shares, out=shares, where=shares > 0)
     given *= shares
     # what is dimmer than rounding beside what is bright has no share that means something
@@ -147,7 +147,7 @@ def restoring(grid: TexelGrid, before, luminance, deviations):
     return 1 + given
 
 
-def _around(grid: TexelGrid, luminance):
+def sums_around(grid: TexelGrid, luminance):
     """Sums float32 (N,) of luminance (N,) over the square of texels around each receiver, KEPT to every side."""
     sums, height = np.zeros(len(luminance), np.float32), len(grid.receivers)
     for top in range(0, height if len(sums) else 0, BAND):

@@ -53,7 +53,7 @@ def test_what_auto_chooses_can_be_solved(method, rings, segments, monkeypatch):
     monkeypatch.setitem(PATCH_BUDGETS, "conjugate-gradient", PATCH_BUDGETS["conjugate-gradient"] // 10)
     scene = scene_of(sphere(1.0, rings, segments, (0, 0, 1.2)), box((6, 6, 0.1)))
     lights = (PointLight("Lamp", (2, 2, 4), (9, 9, 9)),)
-    scene = replace(scene, materials=(Material("grey", (0.8, 0.8, 0.8)),), lights=lights)
+    scene = replace(scene, materials=(Material("grey", (0.8, 0.8, 0.8)),) * len(scene.materials), lights=lights)
     assert len(scene.triangles) <= EXCHANGE_TRIANGLES // 10
     settings = BakeSettings(target="vertex", method=method, error=0.5)
     with kernel_of(scene, threads=2) as kernel:

@@ -5,7 +5,7 @@ import pytest
 
 from addon.core.emitters import emitters_of
 from addon.core.gather_sums import no_sums
-from addon.core.guides import EVEN, LEAST_GROUP, MOST_GROUP, WIDEST, _shares, group_size, learn_guides, no_guides
+from addon.core.guides import EVEN, LEAST_GROUP, MOST_GROUP, WIDEST, group_size, guide_shares, learn_guides, no_guides
 from addon.core.kernel import GUIDE_CELLS
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
@@ -111,7 +111,7 @@ def test_what_is_too_bright_to_square_is_shared_as_the_brightest():
     moments = np.full((1, GUIDE_CELLS), 1e38, np.float32)
     moments[0, ::2] = np.inf
     with np.errstate(invalid="raise"):
-        shares = _shares(moments)
+        shares = guide_shares(moments)
     assert shares.sum() == pytest.approx(1, abs=1e-5)  # 64 float32 additions
     assert (shares[0, ::2] > shares[0, 1::2]).all()
 

@@ -8,7 +8,7 @@ from addon.core.kernel import clamp_outliers, smooth
 from addon.core.luminance import LUMINANCE
 from addon.core.receivers import Receivers
 from addon.core.relative import scale_of
-from addon.core.smoothing import BAND, KEPT, MOST_KEPT, TexelGrid, _around, restoring
+from addon.core.smoothing import BAND, KEPT, MOST_KEPT, TexelGrid, restoring, sums_around
 from addon.core.workers import Workers
 from tests.reference import smoothing as reference
 
@@ -164,7 +164,7 @@ def test_what_is_around_a_texel_is_the_square_it_stands_in():
     grid.receivers[rng.random(grid.receivers.shape) < 0.3] = -1
     light = rng.random(grid.receivers.size).astype(np.float32)
     image = np.where(grid.receivers >= 0, light.reshape(grid.receivers.shape), 0.0)
-    found = _around(grid, light)
+    found = sums_around(grid, light)
     for row, column in zip(*np.nonzero(grid.receivers >= 0)):
         square = image[max(row - KEPT, 0) : row + KEPT + 1, max(column - KEPT, 0) : column + KEPT + 1]
         # differences of float64 sums over all rows, rounded once
