@@ -55,7 +55,7 @@ Handler = Callable[[Case, object], object]
 
 def handler_of(case: Case) -> Handler | None:
     """The function that computes a case's quantity, by its words and params; None where none understands it."""
-    for understands, handler in HANDLERS:
+    for understands, handler in (*FACTOR_HANDLERS, *SOLUTION_HANDLERS):
         if understands(case):
             return handler
     return None
@@ -90,7 +90,7 @@ def _names_element(case):
 
 
 # the first that understands a case runs it
-HANDLERS: tuple[tuple[Callable[[Case], bool], Handler], ...] = (
+FACTOR_HANDLERS: tuple[tuple[Callable[[Case], bool], Handler], ...] = (
     (_names_element, case_factors.element_case),
     (_names_surfaces, case_factors.polygons_case),
     (case_factors.is_matrix, case_factors.matrix_case),
@@ -102,6 +102,8 @@ HANDLERS: tuple[tuple[Callable[[Case], bool], Handler], ...] = (
      case_factors.concentric_spheres_case),
     (_says(r"f_ij.*sphere"), case_factors.sphere_interior_case),
     (_says(r"^irradiance at"), case_factors.irradiance_case),
+)  # fmt: skip
+SOLUTION_HANDLERS: tuple[tuple[Callable[[Case], bool], Handler], ...] = (
     (lambda case: "continuum" in case.id + case.quantity and "cube" in case.id, case_solutions.continuum_case),
     (_says(r"^b everywhere"), case_solutions.furnace_case),
     (_says(r"^b per face", params=("rho", "E")), case_solutions.faces_case),
@@ -133,7 +135,7 @@ def run_case(case: Case, estimator, method: str) -> CaseResult:
         if isinstance(estimator, SampledEstimator):
             more = MORE_RAYS.get(case.tolerance_class, 1)
             estimator = replace(estimator, ray_limit=more * estimator.ray_limit)
-            if handler.__module__ in (case_solutions.__name__, case_spheres.__name__):
+            if any(handler is solves for _, solves in SOLUTION_HANDLERS):
                 estimator = estimator.coarser()
         found = handler(case, estimator)
         judged = _judge(found, case, tolerance)
