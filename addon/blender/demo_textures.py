@@ -8,14 +8,14 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from .image_pixels import write_pixels
+
 
 def packed_image(name, pixels):
     """An 8-bit sRGB image of the given pixels, packed."""
     height, width = pixels.shape[:2]
     image = bpy.data.images.new(name, width, height)
-    rgba = np.ones((height, width, 4), np.float32)
-    rgba[..., :3] = pixels
-    image.pixels.foreach_set(rgba.ravel())
+    write_pixels(image, pixels)
     image.update()
     image.pack()
     return image

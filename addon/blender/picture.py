@@ -16,6 +16,7 @@ import numpy as np
 
 from ..core.luminance import LUMINANCE
 from .as_rendered import as_rendered
+from .image_pixels import read_pixels, write_pixels
 from .picture_materials import Light, LitMaterials
 from .read_mesh import BAKED_COLOURS, LIGHTMAP_LAYER
 from .rects import in_lightmap, rect_of
@@ -197,10 +198,8 @@ def _automatic_exposure(scene, width, height):
         path = str(Path(folder) / "small.exr")
         _render(scene, path, max(width // 4, 1), max(height // 4, 1), 4, "OPEN_EXR")
         image = bpy.data.images.load(path)
-        pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
-        image.pixels.foreach_get(pixels)
+        luminance = read_pixels(image)[..., :3] @ LUMINANCE
         bpy.data.images.remove(image)
-    luminance = pixels.reshape(-1, 4)[:, :3] @ LUMINANCE
     lit = luminance[luminance > 0]
     return float(np.log2(MIDDLE_GREY / np.median(lit))) if len(lit) else 0.0
 
@@ -210,20 +209,15 @@ def save_lightmap_png(image, path):
 
     The brightness L / (1 + L), with L = 1 at the median of the lit texels, shows shadow and sun patch together.
     """
-    width, height = image.size
-    pixels = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    light = np.nan_to_num(np.maximum(pixels.reshape(-1, 4)[:, :3], 0))
+    light = np.nan_to_num(np.maximum(read_pixels(image)[..., :3], 0))
     luminance = light @ LUMINANCE
     lit = luminance[luminance > 0]
     scaled = light / (np.median(lit) if len(lit) else 1.0)
-    shown = scaled / (1 + scaled @ LUMINANCE)[:, None]
+    shown = scaled / (1 + scaled @ LUMINANCE)[..., None]
 
-    rgba = np.ones((width * height, 4), np.float32)
-    rgba[:, :3] = _srgb(np.clip(shown, 0, 1))
-    png = bpy.data.images.new("lightmap to look at", width, height)
+    png = bpy.data.images.new("lightmap to look at", *image.size)
     try:
-        png.pixels.foreach_set(rgba.ravel())
+        write_pixels(png, _srgb(np.clip(shown, 0, 1)))
         png.file_format = "PNG"
         png.filepath_raw = str(Path(path).resolve())
         png.save()

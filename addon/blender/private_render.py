@@ -10,6 +10,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from .image_pixels import read_pixels
+
 RESULT = "Render Result"  # Blender's image of every scene's last render, which the first makes
 ON_DIFFUSE_SURFACES = {"Is Diffuse Ray": 1.0, "Is Reflection Ray": 1.0, "Ray Depth": 1.0, "Diffuse Depth": 1.0}
 
@@ -74,11 +76,9 @@ def rendered(scene, width, height) -> np.ndarray:
         bpy.ops.render.render(write_still=True, scene=scene.name)
         image = bpy.data.images.load(render.filepath)
         try:
-            pixels = np.empty(width * height * image.channels, np.float32)
-            image.pixels.foreach_get(pixels)
+            return read_pixels(image)[..., :3]
         finally:
             bpy.data.images.remove(image)
-    return pixels.reshape(height, width, -1)[..., :3]
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.scene import BRIGHTEST, Texture
+from .image_pixels import read_pixels
 from .mesh_colours import palette
 from .shader_nodes import Unreadable
 
@@ -127,14 +128,11 @@ def shrunk(pixels, longest):
 
 
 def _stored_pixels(image, warn):
-    width, height = image.size
-    if not width or not height:
+    if not all(image.size):
         raise Unreadable(f"image '{image.name}', which cannot be loaded")
     if image.source in {"TILED", "MOVIE", "SEQUENCE"}:
         warn(f"image '{image.name}': only one picture of its {image.source.lower()} source is read")
-    pixels = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(pixels)
-    return pixels.reshape(height, width, image.channels)
+    return read_pixels(image)
 
 
 def _rgb(pixels):

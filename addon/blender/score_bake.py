@@ -17,6 +17,7 @@ from ..core.scene import exitance_from_radiance
 from .as_rendered import as_rendered
 from .attribute_values import read_values
 from .files import FileError
+from .image_pixels import read_pixels
 from .read_mesh import LIGHTMAP_LAYER
 from .rects import in_lightmap, rect_of
 from .write_lightmap import IMAGE_PROPERTY
@@ -129,15 +130,7 @@ def _on_object(graph, object_name, matrix, part, allowed):
     corners = read_values(mesh.vertices, "co", np.float32, 3)[vertices[chosen]] @ matrix[:3, :3].T + matrix[:3, 3]
     points = np.einsum("nk,nkc->nc", part["bary"], corners)
     uvs = np.einsum("nk,nkc->nc", part["bary"], read_values(layer.uv, "vector", np.float32, 2)[loops[chosen]])
-    looked_up = bilinear(_pixels(image), in_lightmap(uvs, rect_of(original)))
+    looked_up = bilinear(read_pixels(image)[..., :3], in_lightmap(uvs, rect_of(original)))
     is_same = np.linalg.norm(points - part["position"], axis=1) <= allowed
     values[is_same] = looked_up[is_same]
     return values
-
-
-def _pixels(image):
-    """Linear pixels (H, W, 3) of a bake's image, which is a float one."""
-    width, height = image.size
-    values = np.empty(width * height * image.channels, np.float32)
-    image.pixels.foreach_get(values)
-    return values.reshape(height, width, image.channels)[..., :3]

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ..core.scene import SceneError
+from .image_pixels import write_pixels
 from .read_mesh import LIGHTMAP_LAYER
 from .rects import WHOLE, in_mesh, set_rect
 
@@ -93,9 +94,7 @@ def _image_for(objects, pixels):
         image.scale(width, height)
     if hasattr(image, "use_half_precision"):
         image.use_half_precision = False
-    rgba = np.ones((height, width, 4), np.float32)
-    rgba[..., :3] = pixels
-    image.pixels.foreach_set(rgba.ravel())
+    write_pixels(image, pixels)
     image.update()
     image.pack()
     return image
