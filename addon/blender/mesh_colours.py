@@ -24,7 +24,7 @@ class MeshColours:
     is_alpha: bool = False
     extends: bool = False  # no place is beyond the palette's edges
 
-    def uvs_of(self, mesh, chosen) -> np.ndarray:
+    def uvs_of(self, mesh, chosen, instance) -> np.ndarray:
         """UVs of chosen triangles (K,) of read_mesh.MeshArrays, float32 (K, 3, 2)."""
         return palette_uvs(mesh.colours[self.attribute, self.is_alpha][chosen])
 

@@ -13,6 +13,7 @@ import numpy as np
 from ..core.scene import BRIGHTEST, Material
 from .colour_nodes import grey, read_colour_node
 from .mesh_colours import MeshColours
+from .object_colours import ObjectColours
 from .private_render import ON_DIFFUSE_SURFACES
 from .read_images import RIM, mean_colour
 from .read_mesh import BAKED_COLOURS
@@ -50,6 +51,7 @@ KINDS_OF_RAYS = {
     *ON_DIFFUSE_SURFACES,
     *OF_SHADOW_RAYS,
 }
+COLOURS_OF_OBJECT = {"Color", "Alpha", "Random"}  # outputs of an Object Info node
 COLOURS_OF_MESH = {"VERTEX_COLOR": "layer_name", "ATTRIBUTE": "attribute_name"}  # nodes, and what names the attribute
 SEEN_BY_ANGLE = {"FRESNEL", "LAYER_WEIGHT"}
 # Their output depends on the ray: where they cannot be read, 0 is a front, and no kind of ray that a bake has.
@@ -111,7 +113,9 @@ class MaterialReading:
 
     def _seen_so(self) -> Material:
         surface = self._surface()
-        if len(self._notes.coordinates) > 1 and any(isinstance(kind, MeshColours) for kind in self._notes.coordinates):
+        if len(self._notes.coordinates) > 1 and any(
+            isinstance(kind, MeshColours | ObjectColours) for kind in self._notes.coordinates
+        ):
             # a triangle has one place in textures: its image's
             self._takes_mesh_colours, self._notes, self._read, self.guessed = False, Notes(), {}, {}
             surface = self._surface()
@@ -144,7 +148,7 @@ class MaterialReading:
             textures_extend=self.coordinates().extends,
         )
 
-    def coordinates(self) -> Coordinates | MeshColours:
+    def coordinates(self) -> Coordinates | MeshColours | ObjectColours:
         """The coordinates of the first image; a second kind is named."""
         kinds = list(self._notes.coordinates)
         if len(kinds) > 1:
@@ -350,6 +354,8 @@ class MaterialReading:
             return Colour(np.full(3, mean))
         if reached.node.type in COLOURS_OF_MESH:
             return self._mesh_colour(reached)
+        if reached.node.type == "OBJECT_INFO":
+            return self._object_colour(reached)
         return read_colour_node(reached, self)
 
     def _mesh_colour(self, reached) -> Colour:
@@ -366,6 +372,16 @@ class MaterialReading:
         if reached.socket.identifier == "Fac":  # the mean of its channels, and no luminance
             return pointwise(lambda c: np.broadcast_to(c.mean(axis=-1, keepdims=True), c.shape), colour)
         return colour
+
+    def _object_colour(self, reached) -> Colour:
+        """What differs by object, or the material's own index."""
+        if reached.socket.identifier == "Material Index":
+            return Colour(np.full(3, float(self.blender_material.pass_index)))
+        if reached.socket.identifier not in COLOURS_OF_OBJECT or not self._takes_mesh_colours:
+            raise Unreadable(f"{reached.node.bl_label} node")
+        kind = ObjectColours(reached.socket.identifier)
+        self._notes.coordinates[kind] = kind
+        return Colour(np.ones(3), self._images.of_meshes())
 
     def _image_colour(self, reached) -> Colour:
         if reached.node.image is None:

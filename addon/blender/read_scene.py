@@ -17,6 +17,7 @@ from .as_rendered import as_rendered
 from .materials import Materials
 from .mesh_colours import MeshColours
 from .new_meshes import NewMeshes
+from .object_colours import ObjectColours
 from .place_mesh import PlacedMesh, make_unit_normals, place_mesh
 from .read_lights import read_lights
 from .read_mesh import MeshArrays, are_finite, read_mesh
@@ -176,6 +177,9 @@ class SceneReading:
         for (attribute, _), values in arrays.colours.items():
             if values.max(initial=0.0) > 1:
                 self.warn(f"'{name}': colours of its attribute '{attribute}' above 1 are read as 1")
+        for each in coordinates:
+            if isinstance(each, ObjectColours) and each.of(instance).max() > 1:
+                self.warn(f"'{name}': its colour above 1, by an Object Info node, is read as 1")
         for attribute in arrays.unread_colours:
             self.warn(f"'{name}': its attribute '{attribute or 'of render colours'}' cannot be read: it is black")
         materials = rows[np.clip(arrays.material_slots, 0, len(rows) - 1)]
@@ -184,7 +188,7 @@ class SceneReading:
                 self._refuse(name, f"'{name}' has a volume and no surface: it is not baked")
                 self.new_meshes.forget(name)
             return
-        placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials))
+        placed = place_mesh(arrays, matrix, materials, self._texture_uvs(arrays, materials, instance))
         if target_mesh and self.settings.keep_uvs and placed.lightmap_uvs is not None:
             in_rect = in_lightmap(placed.lightmap_uvs, rect_of(evaluated.original)).astype(np.float32)
             placed = replace(placed, lightmap_uvs=in_rect)
@@ -205,12 +209,12 @@ class SceneReading:
         rows = [self.materials.index_of(material, is_seen_by) for material in materials or [None]]
         return np.array(rows, np.int32)
 
-    def _texture_uvs(self, arrays: MeshArrays, materials):
+    def _texture_uvs(self, arrays: MeshArrays, materials, instance):
         """Each triangle's UVs as its material looks them up, float32 (T, 3, 2)."""
         uvs = np.zeros((len(materials), 3, 2), np.float32)
         for row in np.unique(materials):
             chosen = np.flatnonzero(materials == row)
-            uvs[chosen] = self.materials.coordinates[row].uvs_of(arrays, chosen)
+            uvs[chosen] = self.materials.coordinates[row].uvs_of(arrays, chosen, instance)
         return uvs
 
     def _is_wanted(self, name):

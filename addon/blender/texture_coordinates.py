@@ -26,7 +26,7 @@ class Coordinates:
         low, high = np.array(low, float), np.array(high, float)
         return Coordinates(self.uv_layer, _after(np.column_stack([np.diag(high - low), low]), self.affine), extends)
 
-    def uvs_of(self, mesh, chosen) -> np.ndarray:
+    def uvs_of(self, mesh, chosen, instance) -> np.ndarray:
         """UVs of chosen triangles (K,) of read_mesh.MeshArrays, float32 (K, 3, 2); 0 where it has no such layer."""
         layer = mesh.uvs.get(self.uv_layer or mesh.render_layer)
         if layer is None:

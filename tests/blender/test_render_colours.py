@@ -182,7 +182,7 @@ def test_the_output_of_cycles_is_the_one_that_is_shown(nodes, read):
 def test_what_differs_by_object_is_not_told_by_a_tile(nodes, read):
     material, tree = nodes()
     material.diffuse_color = (*DARK, 1)
-    tree.show(tree.link(tree.new("ObjectInfo"), tree.new("BsdfDiffuse"), "Color", "Color"))
+    tree.show(tree.link(tree.new("ObjectInfo"), tree.new("BsdfDiffuse"), "Location", "Color"))
     (found,), (warning,) = read(material)
     assert found.reflectance == DARK
     assert "Object Info" in warning
