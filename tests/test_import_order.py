@@ -27,6 +27,7 @@ CORE_ORDER = (
     *("charts", "copies", "blocks", "cut", "flatten", "packing", "unwrap", "texels"),
     *("lookup", "seams", "find_seams", "gaps", "smoothing", "probes"),
     *(
+        "effort",
         "denoiser",
         "denoising",
         "allocation",

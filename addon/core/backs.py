@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .effort import Effort
 from .gather import Irradiance, gather_irradiance
 from .kernel import KernelScene
 from .receivers import Receivers
@@ -55,14 +56,12 @@ def translucent_backs(
     return Backs(chosen, shares.astype(np.float32), _behind(scene, before), grid)
 
 
-def with_backs(front: Irradiance, backs: Backs, kernel, solved, error, seed, seconds_left, on_step) -> Irradiance:
+def with_backs(front: Irradiance, backs: Backs, kernel, solved, effort: Effort) -> Irradiance:
     """The irradiance of the fronts, where they are translucent mixed with that of the backs as they show it:
     (rho E_front + tau E_back) / (rho + tau). The error that is seen stays that of the fronts, and
     of seams theirs alone are stitched: what an opaque surface has no part in begins there.
     """
-    behind = gather_irradiance(
-        kernel, solved, backs.receivers, backs.grid, None, error, seed, None, seconds_left, on_step
-    )
+    behind = gather_irradiance(kernel, solved, backs.receivers, backs.grid, None, effort)
     values = front.values.copy()
     values[backs.chosen] += backs.shares * (behind.values - values[backs.chosen])
     return replace(

@@ -10,6 +10,7 @@ import numpy as np
 from .backs import translucent_backs, with_backs
 from .denoiser import open_denoiser
 from .denoising import needs_denoising
+from .effort import Effort
 from .emitters import emitters_of
 from .find_seams import find_seams
 from .gather import Irradiance, gather_irradiance
@@ -92,13 +93,13 @@ def bake(
         progress.begin("gather")
         backs = translucent_backs(scene, kernel, receivers, grid, settings.smooth_angle_deg)
         in_front = 1 if backs is None else len(receivers) / (len(receivers) + len(backs.receivers))  # of the time left
-        irradiance = gather_irradiance(
-            kernel, solved, receivers, grid, seen, settings.error, settings.seed, denoise,
-            lambda: in_front * seconds_left(), progress.step,
-        )  # fmt: skip
+        effort = Effort(
+            settings.error, settings.seed, denoise, lambda: in_front * seconds_left(), on_step=progress.step
+        )
+        irradiance = gather_irradiance(kernel, solved, receivers, grid, seen, effort)
         if backs is not None:
-            how = settings.error, settings.seed, seconds_left, lambda done: progress.poll()
-            irradiance = with_backs(irradiance, backs, kernel, solved, *how)
+            effort = Effort(settings.error, settings.seed, None, seconds_left, lambda done: progress.poll())
+            irradiance = with_backs(irradiance, backs, kernel, solved, effort)
 
         progress.begin("texels")
         lightmap = corner_colours = None

@@ -11,7 +11,7 @@ import numpy as np
 
 from .gaps import fill_gaps
 from .luminance import luminance_of
-from .probes import Measured
+from .probes import Probes
 from .relative import scale_of
 from .smoothing import TexelGrid
 
@@ -26,7 +26,7 @@ def needs_denoising(rms, error) -> bool:
     return rms > NEEDED * error
 
 
-def denoised(denoise, grid: TexelGrid, values, noise, direct, gathered, pooled, chosen, probes: Measured):
+def denoised(denoise, grid: TexelGrid, values, noise, direct, gathered, pooled, probes: Probes):
     """Irradiance ``values`` (N, 3) moved towards what ``denoise`` makes of raw direct plus ``gathered`` light (N, 3).
 
     Parameters
@@ -34,7 +34,6 @@ def denoised(denoise, grid: TexelGrid, values, noise, direct, gathered, pooled, 
     denoise : image float32 (H, W, 3) -> the same without noise, or None
     noise : float32 (N,) of ``values``, as a variance relative to their scale
     pooled : averages (N,) over neighbours: single receivers' noise is known too badly to go by
-    chosen : receivers (K,) that ``probes`` measured
     """
     is_set = grid.receivers >= 0
     image = np.zeros((*is_set.shape, 3), np.float32)
@@ -50,15 +49,15 @@ def denoised(denoise, grid: TexelGrid, values, noise, direct, gathered, pooled, 
     # where there is no gathered light, to the bit, there is none
     is_usable = np.isfinite(other) & (values != direct)
     other = np.where(is_usable, np.maximum(other, 0), values)
-    return mixed(values, other, noise, pooled, chosen, probes)
+    return mixed(values, other, noise, pooled, probes)
 
 
-def mixed(first, second, noise, pooled, chosen, probes: Measured):
+def mixed(first, second, noise, pooled, probes: Probes):
     """Two estimates (N, 3) of irradiance, mixed so that the error is least at the probes: float32 (N, 3).
 
-    ``noise`` (N,) and ``pooled`` as above, ``chosen`` (K,) the receivers that the probes measured.
+    ``noise`` (N,) and ``pooled`` as above.
     """
-    scale = scale_of(first)
+    scale, chosen = scale_of(first), probes.receivers
     apart = luminance_of(second - first) / scale
     noise = pooled(noise)
     count = max(1, min(DOUBTS, len(chosen) // LEAST_PROBES))
@@ -66,7 +65,7 @@ def mixed(first, second, noise, pooled, chosen, probes: Measured):
     if len(chosen) >= 2 * count * LEAST_PROBES:
         group, count = 2 * group + _quantile_groups(noise, chosen, 2), 2 * count
     # one wrong point counts as one, however wrong
-    wanted = np.clip((probes.luminance - luminance_of(first[chosen])) / scale[chosen], -1, 1)
+    wanted = np.clip((probes.measured.luminance - luminance_of(first[chosen])) / scale[chosen], -1, 1)
     moved = apart[chosen].astype(np.float64)
     along = np.bincount(group[chosen], wanted * moved, count)
     shares = np.clip(along / np.maximum(np.bincount(group[chosen], moved**2, count), 1e-30), 0, 1)

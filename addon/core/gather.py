@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .direct_light import first_direct, refined_direct
+from .effort import Effort
 from .gather_job import GatherJob
 from .guides import learn_guides, no_guides
 from .kernel import KernelScene
@@ -64,11 +64,7 @@ def gather_irradiance(
     receivers: Receivers,
     grid: TexelGrid | VertexGraph,
     seen: SeenPoints | None,
-    error: float,
-    seed: int,
-    denoise: Callable | None,
-    seconds_left,
-    on_step,
+    effort: Effort,
 ) -> Irradiance:
     """Direct plus gathered irradiance at receivers, and how wrong it is.
 
@@ -77,22 +73,17 @@ def gather_irradiance(
     solved : the patches' reflected light, and what direct light is sampled from
     grid : the texels that the receivers are, or the vertices' values, over which gathered light is smoothed
     seen : random points of the surfaces, at which the result is looked up, or None
-    error : target of the relative error [1]
-    denoise : a denoiser.Denoiser, or None
-    seconds_left : () -> float, until the time limit [s]; the first pass is always finished
-    on_step : (0..1) -> None
     """
     if not len(receivers):
         nothing = {"direct": 0, "gather": 0, "probe": 0}
         return Irradiance(np.zeros((0, 3), np.float32), 0.0, 0.0, True, "", False, nothing)
-    started = time.perf_counter()
+    started, error, seed = time.perf_counter(), effort.error, effort.seed
     job = GatherJob(kernel, solved, receivers, grid.shown, no_guides(len(receivers)))
-    job, direct, rays = _first_looks(job, grid, error, seed, within(on_step, 0.0, 0.4))
+    job, direct, rays = _first_looks(job, grid, error, seed, within(effort.on_step, 0.0, 0.4))
     guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
     job = replace(job, guides=guides)
     pace = (rays["direct"] + rays["gather"] + learning) / (time.perf_counter() - started)
-    passes = within(on_step, 0.4, 0.6)
-    gathered = gather_until(job, grid, direct, denoise, error, seed, pace, seconds_left, passes)
+    gathered = gather_until(job, grid, direct, effort.stage(0.4, 0.6), pace)
     seen_error, rays["probe"] = (
         _seen_error(job, seen, gathered.values, error, seed + 5) if seen is not None else (0.0, 0)
     )

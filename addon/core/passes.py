@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -12,6 +11,7 @@ import numpy as np
 from .allocation import measured_errors, next_pass, rays_due
 from .denoising import denoised, needs_denoising
 from .direct_light import DirectLight
+from .effort import Effort
 from .gather_job import REPLICATES, GatherJob
 from .gather_sums import no_sums
 from .measuring import probes_among
@@ -119,12 +119,8 @@ def gather_until(
     job: GatherJob,
     grid: TexelGrid | VertexGraph,
     direct: DirectLight,
-    denoise: Callable | None,
-    error,
-    seed,
-    pace,
-    seconds_left,
-    on_step,
+    effort: Effort,
+    pace: float,
 ) -> Gathered:
     """Gather until the error is the target, or further rays no longer help or cannot be afforded.
 
@@ -132,31 +128,31 @@ def gather_until(
 
     Parameters
     ----------
-    grid, denoise, error, seconds_left : as in gather.gather_irradiance
+    grid : as in gather.gather_irradiance
     direct : what it is at the job's receivers; its values are those that are stored
     pace : rays that were traced in a second before
     """
-    count, started = len(job.receivers), time.perf_counter()
+    count, started, error = len(job.receivers), time.perf_counter(), effort.error
     samples, probes = _Samples(count), None
     # what the budget goes by: fewer neighbours take less off
     budgeted = LEAST_FIRST if grid.is_image and count >= MANY else MOST_FIRST
-    first = first_rays(fewest_first(count, grid.is_image), error, pace * seconds_left() / (REPLICATES * count))
+    first = first_rays(fewest_first(count, grid.is_image), error, pace * effort.seconds_left() / (REPLICATES * count))
     active, further = np.arange(count), np.full(count, first, np.int32)
-    aim = VERTEX_AIM if not grid.is_image else AIM if denoise is None else DENOISED_AIM
+    aim = VERTEX_AIM if not grid.is_image else AIM if effort.denoise is None else DENOISED_AIM
     budget, idle, begin, rms, is_first = 0, 0, 0.0, np.inf, True
     while True:
         # half of what is left of the bar for each pass: nobody knows how many there will be
         width = 0.5 * (1 - begin)
-        samples.add(job, active, further, seed, within(on_step, begin, width))
+        samples.add(job, active, further, effort.seed, within(effort.on_step, begin, width))
         begin += width
         del active, further
         budget = budget or ray_budget(samples.rays * budgeted / first, error)
         scales = _show_what_was_gathered(job, grid, samples, direct.values)
-        probes = probes or probes_among(job, grid, error, seed + 1)
+        probes = probes or probes_among(job, grid, error, effort.seed + 1)
         found = _best_estimate(job, grid, samples, scales, direct.values, probes)
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
-            found, aim = _denoised(denoise, job, grid, found, samples, direct, probes), min(aim, AIM)
+            found, aim = _denoised(effort.denoise, job, grid, found, samples, direct, probes), min(aim, AIM)
         idle = idle + 1 if found.rms > max(error, WORTH_IT * rms) else 0
         rms = found.rms
         if rms <= error and not is_first:
@@ -165,14 +161,14 @@ def gather_until(
             stopped = "as further rays no longer help"
         else:
             due = _due(found, samples, probes, error, aim, direct.rms)
-            in_time = seconds_left() * samples.rays / (time.perf_counter() - started)
+            in_time = effort.seconds_left() * samples.rays / (time.perf_counter() - started)
             active, further, stopped = _next(due, samples, rms <= error, budget - samples.rays, in_time)
             del due
         is_first = False
         if stopped is not None:
             if not is_asked and needs_denoising(found.rms, error):
-                found = _denoised(denoise, job, grid, found, samples, direct, probes)
-            values = grid.stitched(found.values, lambda: on_step(1.0))
+                found = _denoised(effort.denoise, job, grid, found, samples, direct, probes)
+            values = grid.stitched(found.values, lambda: effort.on_step(1.0))
             rms, traced = rms_of(probes.squares_of(values)), (samples.rays, probes.measured.rays)
             if found.rms <= error < rms:
                 stopped = "as seams were stitched"
@@ -237,7 +233,7 @@ def _denoised(denoise, job, grid, found: _Found, samples: _Samples, direct: Dire
     noise = np.square(found.noise) / job.weights + np.minimum(direct.variance / scale_of(found.values) ** 2, 1)
     pooled = partial(grid.pooled, job.kernel.workers, job.receivers)
     light = found.values, noise, direct.values, samples.light
-    values = denoised(denoise, grid, *light, pooled, probes.receivers, probes.measured)
+    values = denoised(denoise, grid, *light, pooled, probes)
     other = replace(found, values=values, squares=probes.squares_of(values), is_denoised=True)
     return min(found, other, key=lambda estimate: estimate.rms)
 

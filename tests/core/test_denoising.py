@@ -9,7 +9,7 @@ import pytest
 from addon.core.bake import bake
 from addon.core.denoiser import Denoiser, DenoiserError, open_denoiser
 from addon.core.denoising import denoised, mixed
-from addon.core.probes import Measured
+from addon.core.probes import Measured, Probes
 from addon.core.settings import BakeCancelled, BakeSettings
 from addon.core.smoothing import TexelGrid
 from tests.scenes import closed_box, lamp
@@ -79,6 +79,12 @@ def as_they_are(values):
     return values
 
 
+def probes_of(luminance, receivers):
+    """Probes at receivers (K,) that found luminance (K,), for certain."""
+    ones = np.ones(len(receivers))
+    return Probes(receivers, ones, ones, Measured(luminance, 0 * ones, 0))
+
+
 def test_two_estimates_are_mixed_where_the_probes_find_each_better():
     rng = np.random.default_rng(0)
     truth, count = np.ones((4096, 3)), 4096
@@ -88,7 +94,7 @@ def test_two_estimates_are_mixed_where_the_probes_find_each_better():
     second[2048:] += 0.5 + 0.1 * rng.random((2048, 1))
     chosen = np.arange(0, count, 2)
     noise = np.full(count, 0.01, np.float32)
-    found = mixed(first, second, noise, as_they_are, chosen, Measured(np.ones(len(chosen)), np.zeros(len(chosen)), 0))
+    found = mixed(first, second, noise, as_they_are, probes_of(np.ones(len(chosen)), chosen))
     # luminance weights sum to 1 within float32
     assert np.abs(found - truth).max() < 1e-4
 
@@ -104,8 +110,7 @@ def test_noise_goes_where_it_is_as_stated_and_details_of_its_size_stay():
     first[is_noisy] += step[is_noisy]
     noise = np.where(is_noisy, 0.01, 1e-6).astype(np.float32)
     chosen = np.arange(0, len(truth), 7)
-    probes = Measured(truth[chosen, 0], np.zeros(len(chosen)), 0)
-    found = mixed(first, second, noise, as_they_are, chosen, probes)
+    found = mixed(first, second, noise, as_they_are, probes_of(truth[chosen, 0], chosen))
     assert np.abs(found - truth).max() < 1e-4
 
 
@@ -137,11 +142,10 @@ def test_texels_without_gathered_light_and_what_is_no_number_stay_as_they_were()
     grid, direct, gathered = four_texels()
     painted = np.full((2, 2, 3), 0.9, np.float32)
     painted[1, 1] = np.nan
-    chosen = np.arange(4)
-    probes = Measured(np.full(4, 0.9), np.zeros(4), 0)
+    probes = probes_of(np.full(4, 0.9), np.arange(4))
     noise = np.ones(4, np.float32)
     light = direct + gathered, noise, direct, gathered
-    found = denoised(lambda image: painted, grid, *light, as_they_are, chosen, probes)
+    found = denoised(lambda image: painted, grid, *light, as_they_are, probes)
     assert (found[:2] == direct[:2]).all()
     assert found[2] == pytest.approx(0.9)
     assert (found[3] == (direct + gathered)[3]).all()
@@ -150,9 +154,9 @@ def test_texels_without_gathered_light_and_what_is_no_number_stay_as_they_were()
 def test_a_denoiser_that_fails_changes_nothing():
     grid, direct, gathered = four_texels()
     values = direct + gathered
-    probes = Measured(np.ones(4), np.zeros(4), 0)
+    probes = probes_of(np.ones(4), np.arange(4))
     light = values, np.ones(4, np.float32), direct, gathered
-    assert denoised(lambda image: None, grid, *light, as_they_are, np.arange(4), probes) is values
+    assert denoised(lambda image: None, grid, *light, as_they_are, probes) is values
 
 
 def test_it_can_be_cancelled_while_it_works(library):

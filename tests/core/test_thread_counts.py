@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.bake import bake
+from addon.core.effort import Effort
 from addon.core.emitters import emitters_of
 from addon.core.gather import gather_irradiance
 from addon.core.probes import SeenPoints
@@ -53,9 +54,7 @@ def light_at(threads, method, solver):
         solved = solve_radiosity(scene, kernel, emitters, settings, lambda done: None)
         receivers, graph = vertex_receivers(scene, kernel, 30.0)
         seen = SeenPoints(receivers, lambda values: values)
-        light = gather_irradiance(
-            kernel, solved, receivers, graph, seen, 0.1, 0, None, lambda: np.inf, lambda done: None
-        )
+        light = gather_irradiance(kernel, solved, receivers, graph, seen, Effort(0.1))
     field = [np.ascontiguousarray(array).tobytes() for array in solved.patches.arrays()]
     return solved.solution.radiosity.tobytes(), field, light.values.tobytes(), {**solved.rays, **light.rays}
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from addon.core.effort import Effort
 from addon.core.emitters import emitters_of
 from addon.core.gather import gather_irradiance
 from addon.core.probes import SeenPoints
@@ -53,10 +54,6 @@ def full_light(scene, receivers, threads=2, grid=None, **settings):
             receivers=receivers,
             grid=grid or row_graph(len(receivers)),
             seen=SeenPoints(receivers, lambda values: values),
-            error=settings.error,
-            seed=settings.seed,
-            denoise=None,
-            seconds_left=lambda: np.inf,
-            on_step=lambda done: None,
+            effort=Effort(settings.error, settings.seed),
         )
     return light, solved
