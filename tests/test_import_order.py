@@ -21,9 +21,10 @@ CORE_ORDER = (
     *("polygon", "quadrature", "lambert", "contour", "kinks", "visibility", "analytic", "bodies", "closed_forms"),
     *("transport", "aimed", "hemicube", "sampled", "estimators", "exchange", "solver", "dense"),
     *("cases", "case_scene", "case_factors", "case_solutions", "case_spheres", "shipped_cases", "verify"),
-    *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light", "guides", "gather_sums"),
+    *("conjugate_gradient", "progressive", "stochastic", "receivers", "texel_light"),
+    *("patch_solution", "seen_light", "guides", "gather_sums"),
     *("vertex_graph", "vertices"),
-    *("patch_solution", "patch_light", "decomposition", "choose", "laws", "radiosity"),
+    *("patch_light", "decomposition", "choose", "laws", "radiosity"),
     *("charts", "copies", "blocks", "cut", "flatten", "packing", "unwrap", "texels"),
     *("lookup", "seams", "find_seams", "gaps", "smoothing", "probes"),
     *(

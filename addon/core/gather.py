@@ -80,7 +80,7 @@ def gather_irradiance(
     started, error, seed = time.perf_counter(), effort.error, effort.seed
     job = GatherJob(kernel, solved, receivers, grid.shown, no_guides(len(receivers)))
     job, direct, rays = _first_looks(job, grid, error, seed, within(effort.on_step, 0.0, 0.4))
-    guides, learning = learn_guides(kernel, solved.patches, job.texel_light, solved.sources, receivers, seed + 3)
+    guides, learning = learn_guides(kernel, job.seen_light, receivers, seed + 3)
     job = replace(job, guides=guides)
     pace = (rays["direct"] + rays["gather"] + learning) / (time.perf_counter() - started)
     gathered = gather_until(job, grid, direct, effort.stage(0.4, 0.6), pace)

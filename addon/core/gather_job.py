@@ -11,6 +11,7 @@ from .guides import Guides, no_guides
 from .kernel import KernelScene
 from .radiosity import Solved
 from .receivers import Receivers
+from .seen_light import SeenLight
 from .smoothing import TexelGrid
 from .texel_light import NO_TEXEL_LIGHT, TexelLight
 
@@ -36,6 +37,11 @@ class GatherJob:
     weights: np.ndarray
     guides: Guides
     texel_light: TexelLight = NO_TEXEL_LIGHT
+
+    @property
+    def seen_light(self) -> SeenLight:
+        """What the rays see."""
+        return SeenLight(self.solved.patches, self.solved.sources, self.texel_light)
 
     def part(self, chosen) -> GatherJob:
         """The same for some of the receivers."""
@@ -66,9 +72,8 @@ class GatherJob:
 
     def gather(self, selected, first, take, seed, sums: GatherSums, on_step=None) -> int:
         """Add each replicate's rays ``first`` to ``first + take`` to the ``sums`` of selected receivers (K,)."""
-        light = (self.solved.patches, self.texel_light, self.solved.sources)
-        selected = np.ascontiguousarray(selected, np.uint32)
-        return self.kernel.gather(*light, self.receivers, self.guides, selected, first, take, seed, sums, on_step)
+        where = self.receivers, self.guides, np.ascontiguousarray(selected, np.uint32)
+        return self.kernel.gather(self.seen_light, *where, first, take, seed, sums, on_step)
 
     def glimpse(self, count, seed, on_step=None):
         """Light by ``count`` rays of each receiver in all, whatever its error (N, 3), and the rays traced."""

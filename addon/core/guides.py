@@ -12,6 +12,7 @@ import numpy as np
 
 from .kernel import GUIDE_CELLS, KernelScene
 from .receivers import Receivers
+from .seen_light import SeenLight
 from .z_order import z_order
 
 GROUPS = 1024  # of receivers that share a guide, about; each with as many as
@@ -50,9 +51,7 @@ def no_guides(count: int) -> Guides:
     return Guides(np.full(count, -1, np.int32), np.zeros((0, GUIDE_CELLS), np.float32))
 
 
-def learn_guides(
-    kernel: KernelScene, solution, texel_light, emitters, receivers: Receivers, seed: int
-) -> tuple[Guides, int]:
+def learn_guides(kernel: KernelScene, light: SeenLight, receivers: Receivers, seed: int) -> tuple[Guides, int]:
     """Guides for receivers, and the rays that it took to learn them."""
     if not len(receivers):
         return no_guides(0), 0
@@ -60,9 +59,7 @@ def learn_guides(
     groups = np.full(len(receivers), -1, np.int32)
     groups[order[_runs(starts, ends)]] = np.repeat(np.arange(len(starts), dtype=np.int32), ends - starts)
     members, first_members = _learners(order, starts, ends)
-    moments, rays = kernel.learn_guides(
-        solution, texel_light, emitters, receivers, members, first_members, LEARNING_RAYS, seed
-    )
+    moments, rays = kernel.learn_guides(light, receivers, members, first_members, LEARNING_RAYS, seed)
     return Guides(groups, guide_shares(moments)), rays
 
 

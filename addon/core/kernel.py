@@ -156,34 +156,31 @@ class KernelScene:
         self.workers.each_range(int(first_rays[-1]), 1 << 16, call)
         return received, escaped[0]
 
-    def learn_guides(self, solution, texel_light, emitters, receivers, members, first_members, rays, seed):
+    def learn_guides(self, light, receivers, members, first_members, rays, seed):
         """Mean squares of what groups of receivers see through each cell, float32 (G, GUIDE_CELLS), and the rays."""
         moments = np.empty((len(first_members) - 1, GUIDE_CELLS), np.float32)
-        seen, on_texels, lights, where = (x.arrays() for x in (solution, texel_light, emitters, receivers))
+        seen, where = light.arrays(), receivers.arrays()
 
         def call(start, stop):
             return _kernel.learn_guides(
-                self._scene, self._patches, seen, on_texels, lights, where, members, first_members, start,
-                stop - start, rays, seed, moments,
+                self._scene, self._patches, *seen, where, members, first_members, start, stop - start, rays, seed,
+                moments,
             )  # fmt: skip
 
         return moments, sum(self.workers.each_range(len(moments), 64, call))
 
-    def gather(
-        self, solution, texel_light, emitters, receivers, guides, selected, first, count, seed, io_sums, on_step=None
-    ):
+    def gather(self, light, receivers, guides, selected, first, count, seed, io_sums, on_step=None):
         """Add the radiosity that each selected receiver's rays see to io_sums, a gather_sums.GatherSums.
 
-        Returns the rays traced. ``solution`` is a patch_solution.PatchSolution, ``guides`` a guides.Guides.
+        Returns the rays traced. ``light`` is a seen_light.SeenLight, ``guides`` a guides.Guides.
         """
-        seen, on_texels, lights, where = (x.arrays() for x in (solution, texel_light, emitters, receivers))
-        guiding, sums = guides.arrays(), io_sums.arrays()
+        seen, where, guiding, sums = (each.arrays() for each in (light, receivers, guides, io_sums))
         replicates = io_sums.luminances.shape[1]
 
         def call(start, stop):
             return _kernel.gather(
-                self._scene, self._patches, seen, on_texels, lights, where, guiding, selected[start:stop], replicates,
-                first, count, seed, sums,
+                self._scene, self._patches, *seen, where, guiding, selected[start:stop], replicates, first, count,
+                seed, sums,
             )  # fmt: skip
 
         size = max(64, min(4096, (1 << 17) // (replicates * count)))

@@ -14,7 +14,7 @@ from .patch_solution import PatchSolution
 from .patches import Patches
 from .receivers import patch_receivers
 from .scene import Scene
-from .texel_light import NO_TEXEL_LIGHT
+from .seen_light import SeenLight
 
 POINTS = 8  # of a patch side: where its direct light is measured
 SMALL = 0.25  # of a full-size patch's area: smaller ones are measured at one point
@@ -105,9 +105,8 @@ def _sky_on_patches(scene, kernel, patches: Patches, wanted, emitters, sky, coun
         receivers = patch_receivers(scene, kernel, chosen, points, seed)
         sums = no_sums(len(receivers), 1)
         everyone = np.arange(len(receivers), dtype=np.uint32)
-        rays += kernel.gather(
-            black, NO_TEXEL_LIGHT, emitters, receivers, no_guides(len(receivers)), everyone, 0, count, seed, sums
-        )
+        guides = no_guides(len(receivers))
+        rays += kernel.gather(SeenLight(black, emitters), receivers, guides, everyone, 0, count, seed, sums)
         irradiance[chosen] = sums.means(count).reshape(-1, 2, points, 3).mean(axis=2, dtype=np.float64)
     return irradiance.reshape(-1, 3), rays
 

@@ -27,6 +27,7 @@ from patchlight.core.gather_sums import no_sums
 from patchlight.core.guides import learn_guides
 from patchlight.core.radiosity import solve_radiosity
 from patchlight.core.receivers import surface_receivers
+from patchlight.core.seen_light import SeenLight
 from patchlight.core.settings import BakeSettings
 from patchlight.core.sky import with_suns
 from patchlight.core.smoothing import texel_grid
@@ -96,12 +97,13 @@ def kernels(scene, settings, workers, count):
     light = texel_light(grid.uvs, grid.receivers, is_split, NEAR * grid.spacing)
     light.show(ones)
     solved = solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), settings, lambda done: None)
-    guides, _ = learn_guides(kernel, solved.patches, light, solved.sources, receivers, 3)
+    seen = SeenLight(solved.patches, solved.sources, light)
+    guides, _ = learn_guides(kernel, seen, receivers, 3)
     everyone = np.arange(len(receivers), dtype=np.uint32)
 
     def gather():
         sums = no_sums(len(receivers), REPLICATES)
-        kernel.gather(solved.patches, light, solved.sources, receivers, guides, everyone, 0, RAYS, 1, sums)
+        kernel.gather(seen, receivers, guides, everyone, 0, RAYS, 1, sums)
 
     return {"direct": lambda: kernel.direct(solved.sources, receivers, SHADOW_SAMPLES, 1), "gather": gather}
 

@@ -13,8 +13,8 @@ from addon.core.luminance import LUMINANCE
 from addon.core.patches import cut, grid_of, patch_size_for
 from addon.core.receivers import surface_receivers
 from addon.core.relative import scale_of
+from addon.core.seen_light import SeenLight
 from addon.core.settings import BakeSettings
-from addon.core.texel_light import NO_TEXEL_LIGHT
 from addon.core.triangles import triangle_areas
 from tests.scenes import cornell_box, cube_room, kernel_of, lamp, rectangle, scene_of
 
@@ -108,9 +108,8 @@ def gathered_light(scene, kernel, triangles, weights):
     solved = radiosity.solve_radiosity(scene, kernel, emitters_of(scene, kernel.centre), fine, lambda done: None)
     receivers, count = surface_receivers(scene, triangles, weights), len(triangles)
     sums, everyone = no_sums(count, 1), np.arange(count, dtype=np.uint32)
-    kernel.gather(
-        solved.patches, NO_TEXEL_LIGHT, solved.sources, receivers, no_guides(count), everyone, 0, 2048, 0, sums
-    )
+    light = SeenLight(solved.patches, solved.sources)
+    kernel.gather(light, receivers, no_guides(count), everyone, 0, 2048, 0, sums)
     return sums.means(2048) + kernel.direct(solved.sources, receivers, 256, 0)[0]
 
 

@@ -9,8 +9,8 @@ from addon.core.guides import EVEN, LEAST_GROUP, MOST_GROUP, WIDEST, group_size,
 from addon.core.kernel import GUIDE_CELLS
 from addon.core.radiosity import solve_radiosity
 from addon.core.receivers import Receivers
+from addon.core.seen_light import SeenLight
 from addon.core.settings import BakeSettings
-from addon.core.texel_light import NO_TEXEL_LIGHT
 from tests.reference.guides import cell_directions, share_through_rectangle
 from tests.scenes import BLACK, GREY, kernel_of, rectangle, scene_of
 
@@ -55,7 +55,7 @@ def learned(scene, receivers, then):
     with kernel_of(scene, 2) as kernel:
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, BakeSettings(error=0.1, patch_size=0.2), lambda done: None)
-        guides, rays = learn_guides(kernel, solved.patches, NO_TEXEL_LIGHT, solved.sources, receivers, 1)
+        guides, rays = learn_guides(kernel, SeenLight(solved.patches, solved.sources), receivers, 1)
         return then(kernel, solved, guides, rays)
 
 
@@ -68,7 +68,7 @@ def test_the_mean_square_through_each_cell_is_that_of_the_definition():
         solved = solve_radiosity(scene, kernel, emitters, BakeSettings(error=0.5, patch_size=0.5), lambda done: None)
         one = np.zeros(1, np.uint32), np.array([0, 1], np.uint32)
         receivers = floor_points([point])
-        moments, traced = kernel.learn_guides(solved.patches, NO_TEXEL_LIGHT, solved.sources, receivers, *one, rays, 5)
+        moments, traced = kernel.learn_guides(SeenLight(solved.patches, solved.sources), receivers, *one, rays, 5)
     rng = np.random.default_rng(0)
     for cell in range(GUIDE_CELLS):
         directions = cell_directions((0, 0, 1), cell, rays, rng)
@@ -87,7 +87,7 @@ def test_guided_rays_find_the_same_light_with_less_noise():
         for by in (no_guides(len(receivers)), guides):
             sums = no_sums(len(receivers), 4)
             everyone = np.arange(len(receivers), dtype=np.uint32)
-            kernel.gather(solved.patches, NO_TEXEL_LIGHT, solved.sources, receivers, by, everyone, 0, 64, 9, sums)
+            kernel.gather(SeenLight(solved.patches, solved.sources), receivers, by, everyone, 0, 64, 9, sums)
             light.append(sums.luminances / 64)
         return light
 

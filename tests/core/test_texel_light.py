@@ -10,6 +10,7 @@ from addon.core.kernel import EVEN_SIDE
 from addon.core.patch_solution import PatchSolution
 from addon.core.patches import subdivide
 from addon.core.receivers import surface_receivers
+from addon.core.seen_light import SeenLight
 from addon.core.settings import BakeSettings
 from addon.core.smoothing import texel_grid
 from addon.core.texel_light import NO_LIGHT, packed, texel_light
@@ -65,10 +66,8 @@ def gathered_in_a_box(light, is_split):
         )  # fmt: skip
         sums = no_sums(len(receivers), 1)
         everyone = np.arange(len(receivers), dtype=np.uint32)
-        kernel.gather(
-            field, shown, emitters_of(scene, kernel.centre), receivers, no_guides(len(receivers)), everyone, 0,
-            count, 0, sums,
-        )  # fmt: skip
+        light = SeenLight(field, emitters_of(scene, kernel.centre), shown)
+        kernel.gather(light, receivers, no_guides(len(receivers)), everyone, 0, count, 0, sums)
     return sums.means(count)
 
 

@@ -15,8 +15,8 @@ from addon.core.patch_solution import PatchSolution
 from addon.core.patches import subdivide
 from addon.core.receivers import Receivers
 from addon.core.scene import SunLight
+from addon.core.seen_light import SeenLight
 from addon.core.sky import BRIGHT, MOST_SUNS, sky_map, with_suns
-from addon.core.texel_light import NO_TEXEL_LIGHT
 from tests.physics.lighting import floor, floor_receivers, full_light, random_points
 from tests.reference.sky import irradiance, octahedron_texel, sphere
 from tests.scenes import BLACK, kernel_of, rectangle, scene_of
@@ -91,7 +91,7 @@ def gathered(scene, receivers, sky, rays):
         everyone = np.arange(len(receivers), dtype=np.uint32)
         emitters = emitters_of(scene, kernel.centre)
         guides = no_guides(len(receivers))
-        kernel.gather(field, NO_TEXEL_LIGHT, emitters, receivers, guides, everyone, 0, rays, 0, sums)
+        kernel.gather(SeenLight(field, emitters), receivers, guides, everyone, 0, rays, 0, sums)
     return sums.light
 
 
