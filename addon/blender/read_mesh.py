@@ -11,6 +11,7 @@ from .attribute_values import KINDS_OF_VALUES, read_values
 LIGHTMAP_LAYER = "Lightmap"
 FLAT_DEG = 2.0  # at the most do flat-shaded faces of one plane meet at, in the mesh's own space: nothing parts them
 BAKED_COLOURS = "Patchlight"  # the attribute that holds light, and no colour
+VECTORS, READABLE_DOMAINS = {"FLOAT2", "FLOAT_VECTOR"}, {"POINT", "CORNER", "FACE"}
 INFINITE = 1e15  # Blender stores an infinite coordinate as the largest float
 
 
@@ -28,7 +29,7 @@ class MeshArrays:
     corner_normals : float32 (T, 3, 3); on flat faces the polygon's
     is_flat : bool (T,) flat shaded: the triangle's own normal holds
     sharp_edges : bool (T, 3) edge k runs from corner k to corner k + 1
-    uvs : dict, name of a UV layer -> float32 (T, 3, 2)
+    uvs : dict, name of a UV layer, or of an attribute of vectors -> float32 (T, 3, 2)
     render_layer : str, the UV layer that textures use; "" where there is none
     colours : dict, name of an attribute ("" = the render colours) and whether of its alpha -> float32 (T, 3), the
         mean; 0 where there is none
@@ -50,7 +51,7 @@ class MeshArrays:
 
 
 def read_mesh(mesh, uv_layers=(), colours=()) -> MeshArrays:
-    """Read a mesh; of its UV layers the render layer, "Lightmap", and those named, of its colours those named."""
+    """Read a mesh; of its UVs the render layer, "Lightmap", and those named, of its colours those named."""
     mesh.calc_loop_triangles()
     corners = read_values(mesh.loop_triangles, "loops", np.int32, 3)
     polygons = read_values(mesh.loop_triangles, "polygon_index", np.int32)
@@ -71,7 +72,7 @@ def read_mesh(mesh, uv_layers=(), colours=()) -> MeshArrays:
         # Custom normals are bent from whatever the face has, flat faces included.
         is_flat=is_flat[polygons] & (not mesh.has_custom_normals),
         sharp_edges=is_mesh_edge & edge_sharp[corners],
-        uvs={layer.name: _layer_uvs(layer)[corners] for layer in mesh.uv_layers if layer.name in wanted},
+        uvs={name: uvs for name in wanted if (uvs := _uvs(mesh, name, corners, polygons)) is not None},
         render_layer=render_layer,
         colours={key: _triangle_colours(mesh, *key, corners, polygons) for key in colours},
         unread_colours=tuple(sorted({name for name, _ in colours if not _is_readable(mesh, name)})),
@@ -133,7 +134,7 @@ def _is_readable(mesh, name):
     found = _colour_attribute(mesh, name)
     if found is None:
         return bool(name) or not len(mesh.color_attributes)
-    return found.data_type in KINDS_OF_VALUES and found.domain in {"POINT", "CORNER", "FACE"}
+    return found.data_type in KINDS_OF_VALUES and found.domain in READABLE_DOMAINS
 
 
 def _flags(mesh, attribute, count):
@@ -147,8 +148,17 @@ def _material_slots(mesh):
     return _attribute(mesh, "material_index", "value", np.int32, 1)
 
 
-def _layer_uvs(layer):
-    return np.nan_to_num(read_values(layer.uv, "vector", np.float32, 2), posinf=0.0, neginf=0.0)
+def _uvs(mesh, name, corners, polygons):
+    """A UV layer's, or the first two numbers of an attribute of vectors, as nodes that make meshes leave them."""
+    found = mesh.attributes.get(name) if name else None
+    if found is None or found.data_type not in VECTORS or found.domain not in READABLE_DOMAINS:
+        return None
+    width = KINDS_OF_VALUES[found.data_type].width
+    values = read_values(found.data, "vector", np.float32, width)[:, :2]
+    values = np.nan_to_num(values, posinf=0.0, neginf=0.0)
+    if found.domain == "FACE":
+        return np.repeat(values[polygons][:, None], 3, axis=1)
+    return values[corners if found.domain == "CORNER" else corner_vertices(mesh)[corners]]
 
 
 def _next_corners(mesh):

@@ -47,6 +47,9 @@ def read_coordinates(vector: Reached) -> Coordinates:
     node = vector.node
     if node.type == "UVMAP":
         return Coordinates(node.uv_map)
+    if node.type == "ATTRIBUTE" and node.attribute_type == "GEOMETRY" and node.attribute_name:
+        if vector.socket.identifier in {"Vector", "Color"}:
+            return Coordinates(node.attribute_name)
     if node.type == "TEX_COORD" and vector.socket.identifier == "UV":
         return Coordinates()
     if node.type == "MAPPING":

@@ -270,6 +270,26 @@ def test_a_uv_map_node_chooses_its_layer(nodes, add_mesh, add_image):
     assert (read_scene(bpy.context.scene).uvs == 1.5).all()
 
 
+@pytest.mark.parametrize("kind", ["UVMap", "Attribute"])
+@pytest.mark.parametrize(
+    ("stored", "domain"), [("FLOAT_VECTOR", "POINT"), ("FLOAT_VECTOR", "FACE"), ("FLOAT2", "CORNER")]
+)
+def test_uvs_are_an_attribute_too(nodes, add_mesh, add_image, kind, stored, domain):
+    """As geometry nodes leave them."""
+    material, tree = nodes()
+    chosen, node = tree.new(kind), image_node(tree, add_image(checker()))
+    setattr(chosen, "uv_map" if kind == "UVMap" else "attribute_name", "made")
+    tree.link(chosen, node, "UV" if kind == "UVMap" else "Vector", "Vector")
+    tree.show(tree.link(node, tree.new("BsdfDiffuse"), 0, "Color"))
+    triangle = add_mesh("Triangle", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], material)
+    made = triangle.data.attributes.new("made", stored, domain)
+    numbers = np.random.default_rng(0).random((len(made.data), 3 if stored == "FLOAT_VECTOR" else 2))
+    made.data.foreach_set("vector", numbers.ravel())
+    scene = read_scene(bpy.context.scene)
+    np.testing.assert_allclose(scene.uvs[0], np.broadcast_to(numbers[:, :2], (3, 2)), rtol=1e-6)  # float32
+    assert scene.warnings == ()
+
+
 def test_unreadable_colours_take_the_viewport_colour_and_are_named(nodes, read_material):
     material, tree = nodes("Marble")
     material.diffuse_color = RED
