@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.luminance import LUMINANCE
+from . import number_nodes
+from .hsv import hsv_of, rgb_of
+from .number_nodes import clamped, input_number
 from .shader_nodes import Reached, Unreadable, constant
 from .surfaces import Colour, pointwise
 
@@ -27,15 +29,6 @@ BLENDS = {
     "DARKEN": np.minimum,
     "LIGHTEN": np.maximum,
 }
-MATH = {
-    "ADD": np.add,
-    "SUBTRACT": np.subtract,
-    "MULTIPLY": np.multiply,
-    "MINIMUM": np.minimum,
-    "MAXIMUM": np.maximum,
-    "DIVIDE": lambda a, b: np.where(b != 0, a / np.where(b != 0, b, 1), 0),
-    "POWER": lambda a, b: np.power(np.maximum(a, 0), b),
-}
 
 OBSERVER = (  # of x, y, z: (weight, (middle, width below, width above [nm]))
     ((1.056, (599.8, 37.9, 31.0)), (0.362, (442.0, 16.0, 26.7)), (-0.065, (501.1, 20.4, 26.2))),
@@ -48,17 +41,12 @@ REC709_OF_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415],
 def read_colour_node(reached: Reached, reading) -> Colour:
     """The colour that a node puts out; Unreadable where it, or one that feeds it, is not known.
 
-    ``reading`` is the MaterialReading: its ``readable_colour`` is asked for what feeds the node, its ``factor`` for
-    numbers, which it guesses where they are unreadable.
+    ``reading`` is the MaterialReading: its ``readable_colour`` and ``readable_number`` are asked for what feeds the
+    node, its ``factor`` for numbers that it guesses where they are unreadable.
     """
     if reached.node.type not in READERS:
         raise Unreadable(f"{reached.node.bl_label} node")
     return READERS[reached.node.type](reached, reading)
-
-
-def grey(colour: Colour) -> Colour:
-    """A colour as an input that is a number takes it."""
-    return pointwise(lambda c: np.repeat((c @ LUMINANCE)[..., None], 3, axis=-1), colour)
 
 
 def _mix(reached, reading):
@@ -76,16 +64,15 @@ def _mix(reached, reading):
     is_of_numbers = node.type == "MIX" and node.data_type == "FLOAT"
 
     def read(number):
-        colour = reading.readable_colour(reached.feeding(number))
-        return grey(colour) if is_of_numbers else colour
+        return (reading.readable_number if is_of_numbers else reading.readable_colour)(reached.feeding(number))
 
     def mixed(t, a, b):
         return a + (np.clip(t, 0, 1) if clamps_factor else t) * (BLENDS[blend](a, b) - a)
 
     factor = reading.factor(reached.feeding(inputs[0]))
     if factor.is_black:  # the other side need not be readable
-        return _clamped(read(inputs[1]), clamps)
-    return _clamped(pointwise(mixed, factor, read(inputs[1]), read(inputs[2])), clamps)
+        return clamped(read(inputs[1]), clamps)
+    return clamped(pointwise(mixed, factor, read(inputs[1]), read(inputs[2])), clamps)
 
 
 def _ramp(reached, reading):
@@ -93,7 +80,7 @@ def _ramp(reached, reading):
     table = np.array([ramp.evaluate(x) for x in np.linspace(0, 1, TABLE)])
     table = np.repeat(table[:, 3:], 3, axis=1) if reached.socket.identifier == "Alpha" else table[:, :3]
     try:
-        factor = grey(reading.readable_colour(reached.feeding(0)))
+        factor = reading.readable_number(reached.feeding(0))
     except Unreadable as error:
         reading.guess(f"a Color Ramp of its colours hangs on a {error}, which cannot be read: the ramp's mean is used")
         return Colour(table.mean(axis=0))
@@ -125,30 +112,16 @@ def _looked_up(tables, colours):
 
 
 def _hue_saturation(reached, reading):
-    hue, saturation, value = (_number(reached, reading, k) for k in range(3))
+    hue, saturation, value = (input_number(reached, reading, k) for k in range(3))
 
     def changed(c, hue, saturation, value):
-        h, s, v = _hsv_of(c)
+        h, s, v = hsv_of(c)
         h, s = (h + hue[..., 0] + 0.5) % 1.0, np.clip(s * saturation[..., 0], 0, 1)
-        return _rgb_of(h, s, v * value[..., 0])
+        return rgb_of(h, s, v * value[..., 0])
 
     factor, colour = reading.factor(reached.feeding(3)), reading.readable_colour(reached.feeding(4))
     other = pointwise(changed, colour, hue, saturation, value)
     return pointwise(lambda t, a, b: np.maximum(a + t * (b - a), 0), factor, colour, other)
-
-
-def _hsv_of(c):
-    """Hue, saturation and value (...) of colours (..., 3), each hue a share of the circle."""
-    most, least = c.max(axis=-1), c.min(axis=-1)
-    spread = most - least
-    r, g, b = np.moveaxis((most[..., None] - c) / np.where(spread > 0, spread, 1)[..., None], -1, 0)
-    hue = np.select([c[..., 0] == most, c[..., 1] == most], [b - g, 2 + r - b], 4 + g - r) / 6 % 1.0
-    return np.where(spread > 0, hue, 0), np.where(most > 0, spread / np.where(most > 0, most, 1), 0), most
-
-
-def _rgb_of(hue, saturation, value):
-    full = np.stack([np.abs(hue * 6 - 3) - 1, 2 - np.abs(hue * 6 - 2), 2 - np.abs(hue * 6 - 4)], axis=-1)
-    return ((np.clip(full, 0, 1) - 1) * saturation[..., None] + 1) * value[..., None]
 
 
 def blackbody(kelvin) -> np.ndarray:
@@ -173,7 +146,7 @@ def _gamma(reached, reading):
     def raised(c, exponent):
         return np.where(c > 0, np.power(np.where(c > 0, c, 1), exponent), c)
 
-    return pointwise(raised, reading.readable_colour(reached.feeding(0)), _number(reached, reading, 1))
+    return pointwise(raised, reading.readable_colour(reached.feeding(0)), input_number(reached, reading, 1))
 
 
 def _invert(reached, reading):
@@ -190,28 +163,12 @@ def _brightness_contrast(reached, reading):
     def changed(c, bright, contrast):
         return np.maximum((1 + contrast) * c + bright - contrast / 2, 0)
 
-    numbers = (_number(reached, reading, k) for k in (1, 2))
+    numbers = (input_number(reached, reading, k) for k in (1, 2))
     return pointwise(changed, reading.readable_colour(reached.feeding(0)), *numbers)
 
 
-def _math(reached, reading):
-    node = reached.node
-    if node.operation not in MATH:
-        raise Unreadable(f"{node.bl_label} node ({node.operation.replace('_', ' ').lower()})")
-    inputs = [grey(reading.readable_colour(reached.feeding(k))) for k in (0, 1)]
-    return _clamped(pointwise(MATH[node.operation], *inputs), node.use_clamp)
-
-
-def _number(reached, reading, k):
-    """Of an input; what its field says where it is linked to what cannot be read."""
-    return reading.factor(reached.feeding(k), reached.node.inputs[k].default_value)
-
-
-def _clamped(colour, clamps):
-    return pointwise(lambda c: np.clip(c, 0, 1), colour) if clamps else colour
-
-
 READERS = {
+    **number_nodes.READERS,
     "MIX": _mix,
     "MIX_RGB": _mix,
     "VALTORGB": _ramp,
@@ -220,7 +177,6 @@ READERS = {
     "GAMMA": _gamma,
     "INVERT": _invert,
     "BRIGHTCONTRAST": _brightness_contrast,
-    "RGBTOBW": lambda reached, reading: grey(reading.readable_colour(reached.feeding(0))),
-    "MATH": _math,
+    "RGBTOBW": lambda reached, reading: reading.readable_number(reached.feeding(0)),
     "BLACKBODY": lambda reached, reading: Colour(blackbody(constant(reached.feeding(0)))),
 }

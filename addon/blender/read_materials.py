@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.scene import BRIGHTEST, Material
-from .colour_nodes import grey, read_colour_node
+from .colour_nodes import read_colour_node
 from .mesh_colours import MeshColours
 from .object_colours import ObjectColours
 from .private_render import ON_DIFFUSE_SURFACES
@@ -28,7 +28,7 @@ from .shader_nodes import (
     output_input,
     surface_shader,
 )
-from .surfaces import Colour, Surface, pointwise, weighted_sum
+from .surfaces import Colour, Surface, grey, mean_of_channels, pointwise, weighted_sum
 from .texture_coordinates import Coordinates, read_coordinates, with_own_mapping
 from .two_sides import as_shadow_rays_see, two_sided
 from .view_nodes import mean_over_view
@@ -37,6 +37,8 @@ DIFFUSE = {"BSDF_DIFFUSE": "Color", "SUBSURFACE_SCATTERING": "Color", "BSDF_TOON
 VELVET = {"BSDF_SHEEN": "Color"}
 # what white sheen reflects of light from all around, by roughness: as Cycles shows it in a white room
 SHEEN = (0.0, 0.1, 0.3, 0.5, 0.7, 1.0), (0.0, 0.003, 0.035, 0.118, 0.244, 0.447)
+# of a coat of IOR 1.5, in its thickness: the mean of 1 / cos within it over directions that diffuse light leaves for
+COAT_DEPTH = 1.15
 GLOSSY = {
     "BSDF_GLOSSY": "Color",
     "BSDF_ANISOTROPIC": "Color",
@@ -96,7 +98,7 @@ class MaterialReading:
         self._images = images
         self._notes = Notes()
         self._read = {}
-        self._takes_mesh_colours, self._all_repeat = True, False
+        self._takes_mesh_colours, self._all_repeat, self._wants_number = True, False, False
         self.is_volume = False  # and no surface
         self._sees = sees
 
@@ -219,15 +221,36 @@ class MaterialReading:
         return weighted_sum([(weight, self._shader(reached)) for weight, reached in parts if not weight.is_black])
 
     def _principled(self, reached) -> Surface:
-        base = self._colour(reached, "Base Color").within(1.0)
-        transmission = float(self._amount(reached, "Transmission Weight").mean[0])
-        radiance = self._emitted(reached, "Emission Color", "Emission Strength")
-        if transmission >= 0.5:
-            surface = Surface(radiance=radiance, transmittance=base)
-        else:
-            surface = Surface(base.scaled(1 - transmission), radiance)
+        coat = self._coat(reached)
+        base = self._colour(reached, "Base Color").within(1.0).times(coat)
+        if not self._amount(reached, "Metallic").is_black:
+            self.say("its metal is baked as diffuse")
+        passing = pointwise(lambda share: np.clip(share, 0, 1), self._amount(reached, "Transmission Weight"))
+        radiance = self._emitted(reached, "Emission Color", "Emission Strength").times(coat)
+        # each of a pane's two faces takes its root, so that the pane has the colour
+        surface = Surface(base.times(rest_of(passing)), radiance, pointwise(np.sqrt, base).times(passing))
+        surface = self._below_sheen(reached, surface)
         alpha = self._alpha(reached)
         return surface if alpha.is_white else weighted_sum([(alpha, surface), (rest_of(alpha), NOTHING)])
+
+    def _coat(self, reached) -> Colour:
+        """What a tinted coat lets through, 1 where there is none: Cycles takes its tint to the power of the way
+        through it, once."""
+        weight = self._amount(reached, "Coat Weight")
+        if weight.is_black or "Coat Tint" not in reached.node.inputs:
+            return ALL
+        tint = self._colour(reached, "Coat Tint").within(1.0)
+        return pointwise(lambda share, t: 1 + np.clip(share, 0, 1) * (t**COAT_DEPTH - 1), weight, tint)
+
+    def _below_sheen(self, reached, surface: Surface) -> Surface:
+        """The surface under its sheen, of which is left what that does not reflect."""
+        weight = self._amount(reached, "Sheen Weight")
+        if weight.is_black:
+            return surface
+        share = weight.scaled(np.interp(self._amount(reached, "Sheen Roughness").mean[0], *SHEEN)).within(1.0)
+        return weighted_sum(
+            [(share, Surface(self._colour(reached, "Sheen Tint").within(1.0))), (rest_of(share), surface)]
+        )
 
     def _alpha(self, reached) -> Colour:
         try:
@@ -254,7 +277,7 @@ class MaterialReading:
     def _grey(self, reached) -> Colour:
         if reached.is_constant or reached.node.type == "VALUE":
             return Colour(np.full(3, constant(reached)))
-        return grey(self.readable_colour(reached))
+        return self.readable_number(reached)
 
     def _mix_factor(self, mix) -> Colour:
         try:
@@ -269,7 +292,7 @@ class MaterialReading:
     def _share(self, reached) -> Colour:
         """A grey of [0, 1]; Unreadable where there is none."""
         coordinates = dict(self._notes.coordinates)
-        factor = pointwise(lambda c: np.clip(c, 0, 1), grey(self.readable_colour(reached)))
+        factor = pointwise(lambda c: np.clip(c, 0, 1), self.readable_number(reached))
         if factor.texture is not None and np.ptp(factor.texture.pixels) > EVEN:
             return factor
         self._notes.coordinates = coordinates  # what is the same all over is so wherever it is looked up
@@ -278,7 +301,7 @@ class MaterialReading:
     def factor(self, reached, usual=0.5) -> Colour:
         """A number that a colour hangs on, which may vary over the surface; ``usual`` where it cannot be read."""
         try:
-            return grey(self.readable_colour(reached))
+            return self.readable_number(reached)
         except Unreadable as error:
             by_view = reached.node.type in BY_VIEW
             value, note = (0.0, self.say) if by_view else (usual, self.guess)
@@ -321,7 +344,7 @@ class MaterialReading:
         """The colour that is reached; Unreadable where it, or a node that makes it, is not known."""
         if reached.is_constant:
             return Colour(constant_colour(reached))
-        key = (reached.socket.as_pointer(), *(group.as_pointer() for group in reached.groups))
+        key = (self._wants_number, reached.socket.as_pointer(), *(group.as_pointer() for group in reached.groups))
         if key not in self._read:
             outer, self._notes = self._notes, Notes()
             try:
@@ -335,6 +358,15 @@ class MaterialReading:
         if isinstance(found, Unreadable):
             raise found
         return found
+
+    def readable_number(self, reached) -> Colour:
+        """The same as an input that is a number takes it, as a grey."""
+        outer, self._wants_number = self._wants_number, True
+        try:
+            colour = self.readable_colour(reached)
+        finally:
+            self._wants_number = outer
+        return mean_of_channels(colour) if getattr(reached.socket, "type", "") == "VECTOR" else grey(colour)
 
     def _read_colour(self, reached) -> Colour:
         if reached.node.type in {"RGB", "VALUE"}:
@@ -362,10 +394,13 @@ class MaterialReading:
         """A colour attribute's, but for those that this add-on has put there: they are light."""
         attribute = getattr(reached.node, COLOURS_OF_MESH[reached.node.type])
         is_elsewhere = getattr(reached.node, "attribute_type", "GEOMETRY") != "GEOMETRY"
-        if is_elsewhere or attribute == BAKED_COLOURS or not self._takes_mesh_colours:
+        if is_elsewhere or attribute == BAKED_COLOURS or (self._wants_number and not self._takes_mesh_colours):
             raise Unreadable(f"{reached.node.bl_label} node")
         if not attribute and reached.node.type == "ATTRIBUTE":
             return Colour(np.zeros(3))  # as Cycles has it; a Color Attribute node takes the render colours
+        if not self._takes_mesh_colours:
+            self.say(f"its colour attribute '{attribute}' is taken as white beside an image")
+            return ALL
         kind = MeshColours(attribute, is_alpha=reached.socket.identifier == "Alpha")
         self._notes.coordinates[kind] = kind
         colour = Colour(np.ones(3), self._images.of_meshes())

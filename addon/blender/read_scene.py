@@ -65,11 +65,17 @@ def read_scene(
     with as_rendered(bpy_scene, view_layer):
         reading = SceneReading(view_layer, settings, wanted, new_meshes or NewMeshes())
         reading.read_objects()
-        return reading.scene(bpy_scene.world)
+        return reading.scene(_world(bpy_scene, view_layer))
 
 
 def _view_layer(bpy_scene):
     return bpy.context.view_layer if bpy_scene == bpy.context.scene else bpy_scene.view_layers[0]
+
+
+def _world(bpy_scene, view_layer):
+    """What a render of the view layer has around it, or None."""
+    override = getattr(view_layer, "world_override", None)  # none before Blender 4.4
+    return (override or bpy_scene.world) if view_layer.use_sky else None
 
 
 @dataclass

@@ -10,7 +10,15 @@ from ..core.scene import BRIGHTEST
 from .private_render import RenderError
 from .read_images import linear_pixels
 from .render_world import rendered_world
-from .shader_nodes import Unreadable, constant, constant_colour, constant_vector, own_mapping, surface_shader
+from .shader_nodes import (
+    Unreadable,
+    constant,
+    constant_colour,
+    constant_vector,
+    output_input,
+    own_mapping,
+    surface_shader,
+)
 
 BLACK = (0.0, 0.0, 0.0)
 WHITE = (1.0, 1.0, 1.0)
@@ -21,10 +29,12 @@ def read_world(world, depsgraph, warn) -> tuple[tuple[float, float, float], Envi
     if world is None:
         return BLACK, None
     evaluated = world.evaluated_get(depsgraph)
-    if not evaluated.use_nodes or evaluated.node_tree is None:
-        return _radiance(evaluated.color, 1.0), None
     if hasattr(world, "cycles_visibility") and not world.cycles_visibility.diffuse:
         return BLACK, None
+    if not evaluated.use_nodes or evaluated.node_tree is None:
+        return _radiance(evaluated.color, 1.0), None
+    if output_input(evaluated.node_tree, "Volume", "OUTPUT_WORLD") is not None:
+        warn(f"world '{world.name}': its volume is left out")
     try:
         shader = surface_shader(evaluated.node_tree, "OUTPUT_WORLD")
         if shader is None:
@@ -42,8 +52,6 @@ def read_world(world, depsgraph, warn) -> tuple[tuple[float, float, float], Envi
 
 def _rendered(world, depsgraph, unreadable, warn):
     """What Cycles shows of a world, or its viewport colour."""
-    if any(node.type == "OUTPUT_WORLD" and node.inputs["Volume"].is_linked for node in world.node_tree.nodes):
-        warn(f"world '{world.name}': its volume is left out")
     try:
         pixels = rendered_world(world, depsgraph.scene.frame_current)
     except RenderError as error:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..core.luminance import LUMINANCE
 from ..core.scene import BRIGHTEST, Texture
 from .read_images import mean_colour, shrunk
 
@@ -63,7 +64,7 @@ class Colour:
             return Colour(np.clip(self.value, 0.0, most))
         pixels = self.texture.pixels
         is_possible = pixels.min() >= 0 and (pixels.max(axis=(0, 1)) * self.value).max() <= most
-        if isinstance(self.texture, Texture) and is_possible and self.value.min() >= 0:
+        if isinstance(self.texture, Texture) and is_possible and self.value.min() >= 0 and self.value.max() <= most:
             return self
         clipped = np.clip(pixels * self.value, 0.0, most).astype(np.float32)
         return Colour(np.ones(3), Texture(self.texture.name, clipped))
@@ -105,6 +106,16 @@ class Surface:
         if self.transmittance.texture is None:
             return scattered.scaled(divided(np.ones(3), self.transmittance.value))
         return pointwise(divided, scattered, self.transmittance)
+
+
+def grey(colour: Colour) -> Colour:
+    """A colour as an input that is a number takes it: its luminance."""
+    return pointwise(lambda c: np.repeat((c @ LUMINANCE)[..., None], 3, axis=-1), colour)
+
+
+def mean_of_channels(colour: Colour) -> Colour:
+    """A vector as an input that is a number takes it."""
+    return pointwise(lambda c: np.repeat(c.mean(axis=-1, keepdims=True), 3, axis=-1), colour)
 
 
 def weighted_sum(parts) -> Surface:

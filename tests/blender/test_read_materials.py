@@ -13,6 +13,7 @@ pytestmark = pytest.mark.usefixtures("empty_file")
 
 RED = (0.5, 0.25, 0.125, 1.0)  # exact in float32
 GREY = (0.75, 0.75, 0.75, 1.0)
+DARK = (0.25, 0.25, 0.25, 1.0)
 
 
 def image_node(tree, image):
@@ -30,9 +31,9 @@ def checker():
     ("kind", "inputs", "reflectance", "radiance", "transmittance"),
     [
         ("BsdfPrincipled", {"Base_Color": RED}, RED, 0, 0),
-        ("BsdfPrincipled", {"Base_Color": RED, "Metallic": 1.0}, RED, 0, 0),
-        ("BsdfPrincipled", {"Base_Color": GREY, "Transmission_Weight": 0.25}, np.array(GREY) * 0.75, 0, 0),
-        ("BsdfPrincipled", {"Base_Color": RED, "Transmission_Weight": 0.5}, 0, 0, RED),
+        ("BsdfPrincipled", {"Base_Color": RED, "Transmission_Weight": 0.0}, RED, 0, 0),
+        ("BsdfPrincipled", {"Base_Color": DARK, "Transmission_Weight": 0.25}, 0.1875 / 0.875, 0, 0.125),
+        ("BsdfPrincipled", {"Base_Color": DARK, "Transmission_Weight": 1.0}, 0, 0, 0.5),
         ("BsdfPrincipled", {"Base_Color": GREY, "Alpha": 0.25}, GREY, 0, 0.75),
         (
             "BsdfPrincipled",
@@ -235,6 +236,56 @@ def test_reflectance_above_one_is_clipped(nodes, read_material, add_image):
     found, _ = read_material(material)
     shown = found.reflectance_texture.pixels * found.reflectance
     np.testing.assert_allclose(shown, np.clip(pixels, 0, 1), atol=1e-6)  # float32
+
+
+@pytest.mark.parametrize("alpha", [0.03, 0.1, 0.2, 0.46, 0.66])
+def test_an_image_that_lets_some_light_through_is_no_brighter_for_it(nodes, read_material, add_image, alpha):
+    """Divided by what is left of 1 in floats, these are 1 + 2^-52 of it."""
+    material, tree = nodes()
+    shader = tree.new("BsdfPrincipled", Alpha=alpha)
+    tree.show(
+        tree.link(image_node(tree, add_image(checker(), is_float=True, space="Non-Color")), shader, 0, "Base Color")
+    )
+    found, warnings = read_material(material)
+    assert max(found.reflectance) <= 1
+    seen = found.reflectance_texture.pixels * found.reflectance
+    np.testing.assert_allclose(seen, checker(), atol=1e-6)  # float32
+    assert warnings == ()
+
+
+def test_an_image_times_the_colours_of_a_mesh_is_the_image(nodes, read_material, add_image):
+    """As importers of glTF make it: a triangle has one place in textures."""
+    material, tree = nodes()
+    product = tree.new("MixRGB")
+    product.blend_type = "MULTIPLY"
+    product.inputs[0].default_value = 1.0
+    tree.link(image_node(tree, add_image(checker(), is_float=True, space="Non-Color")), product, "Color", 1)
+    tree.link(tree.new("VertexColor"), product, "Color", 2)
+    tree.show(tree.link(product, tree.new("BsdfDiffuse"), 0, "Color"))
+    found, (warning,) = read_material(material)
+    np.testing.assert_allclose(found.reflectance_texture.pixels * found.reflectance, checker(), atol=1e-6)
+    assert "white" in warning
+
+
+def test_what_a_coat_and_a_sheen_leave(nodes, read_material):
+    """A tint to the power of the mean way through the coat; a sheen over what it does not reflect."""
+    material, tree = nodes()
+    coated = tree.new("BsdfPrincipled", Base_Color=GREY, Coat_Weight=0.5, Coat_Tint=DARK)
+    tree.show(coated)
+    found, _ = read_material(material)
+    np.testing.assert_allclose(found.reflectance, 0.75 * (0.5 + 0.5 * 0.25**1.15), rtol=1e-5)
+    material, tree = nodes()
+    tree.show(tree.new("BsdfPrincipled", Base_Color=GREY, Sheen_Weight=1.0, Sheen_Roughness=0.5, Sheen_Tint=RED))
+    found, _ = read_material(material)
+    np.testing.assert_allclose(found.reflectance, 0.118 * np.array(RED[:3]) + 0.882 * 0.75, rtol=1e-5)
+
+
+def test_metal_is_named(nodes, read_material):
+    material, tree = nodes()
+    tree.show(tree.new("BsdfPrincipled", Base_Color=RED, Metallic=1.0))
+    found, (warning,) = read_material(material)
+    assert found.reflectance == RED[:3]
+    assert "metal" in warning
 
 
 def test_a_mapping_moves_the_uvs(nodes, add_mesh, add_image):

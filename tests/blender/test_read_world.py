@@ -47,6 +47,33 @@ def set_world():
     return make
 
 
+def test_the_view_layer_decides_what_is_around(set_world, read):
+    set_world((*COLOUR, 1), 4.0)
+    layer = bpy.context.view_layer
+    layer.use_sky = False
+    assert read().world_radiance == (0, 0, 0)
+    layer.use_sky = True
+    if hasattr(layer, "world_override"):
+        layer.world_override = bpy.data.worlds.new("Night")
+        layer.world_override.color = (0, 0, 0.25)
+        layer.world_override.use_nodes = False
+        assert read().world_radiance == (0, 0, 0.25)
+
+
+def test_a_world_that_diffuse_rays_do_not_see_is_black_without_nodes_too(set_world, read):
+    set_world((*COLOUR, 1), 4.0)
+    world = bpy.context.scene.world
+    world.use_nodes, world.cycles_visibility.diffuse = False, False
+    assert read().world_radiance == (0, 0, 0)
+
+
+def test_a_volume_around_is_named(set_world, read):
+    tree, _ = set_world((*COLOUR, 1), 4.0)
+    output = next(node for node in tree.nodes if node.type == "OUTPUT_WORLD")
+    tree.links.new(tree.nodes.new("ShaderNodeVolumeScatter").outputs[0], output.inputs["Volume"])
+    assert any("'Sky'" in warning and "volume" in warning for warning in read().warnings)
+
+
 def test_no_world_is_black(read):
     assert read().world_radiance == (0, 0, 0)
 
