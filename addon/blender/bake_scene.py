@@ -88,7 +88,7 @@ def write(prepared: PreparedBake, result) -> None:
         _require_complete(prepared, result.corner_colours, "colours")
     image = None
     if prepared.settings.target == "lightmap":  # first what needs most memory
-        image = lightmap_image(prepared.targets, result.lightmap.pixels)
+        image = lightmap_image(result.lightmap.pixels)
     for name in prepared.new_meshes.names:
         blender_object = bpy.data.objects[(name, None)]
         give_mesh(blender_object, meshes[name])

@@ -25,19 +25,29 @@ def require_layer_room(name, mesh) -> None:
         raise SceneError(f"'{name}' already has {MOST_LAYERS} UV maps: remove one to make room for '{LIGHTMAP_LAYER}'")
 
 
-def lightmap_image(targets, pixels) -> bpy.types.Image:
-    """The packed image of E / pi, float32 (H, W, 3), row 0 at v = 0; no object points to a new one yet."""
-    return _image_for([bpy.data.objects[(target.name, None)] for target in targets], pixels)
+def lightmap_image(pixels) -> bpy.types.Image:
+    """A new packed image of E / pi, float32 (H, W, 3), row 0 at v = 0; no object points to it yet."""
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new(IMAGE_NAME, width, height, alpha=False, float_buffer=True, is_data=True)
+    if hasattr(image, "use_half_precision"):
+        image.use_half_precision = False
+    write_pixels(image, pixels)
+    image.update()
+    image.pack()
+    return image
 
 
 def write_lightmap(targets, lightmap, image, keeps_uvs: bool) -> None:
-    """Point the objects to the image, and store the UVs unless they are kept."""
+    """Point the objects to the image, with all that shows an earlier one of theirs; store the UVs unless kept."""
     objects = [bpy.data.objects[(target.name, None)] for target in targets]
     if not keeps_uvs:
         _write_uvs(targets, objects, lightmap)
+    before = _own_images(objects)
     for blender_object in objects:
         blender_object[IMAGE_PROPERTY] = image
         blender_object.update_tag()
+    for old in reversed(before):
+        _replace(old, image)
 
 
 def lightmap_of(objects):
@@ -84,27 +94,20 @@ def _add_layer(mesh):
         mesh.uv_layers[render].active_render = True
 
 
-def _image_for(objects, pixels):
-    """The packed image; one that only these objects use is filled anew, so that materials which show it stay right."""
-    height, width = pixels.shape[:2]
-    image = _own_image(objects)
-    if image is None:
-        image = bpy.data.images.new(IMAGE_NAME, width, height, alpha=False, float_buffer=True, is_data=True)
-    elif tuple(image.size) != (width, height):
-        image.scale(width, height)
-    if hasattr(image, "use_half_precision"):
-        image.use_half_precision = False
-    write_pixels(image, pixels)
-    image.update()
-    image.pack()
-    return image
+def _own_images(objects):
+    """Lightmaps of earlier bakes that only these objects point to."""
+    images = {ob.get(IMAGE_PROPERTY): None for ob in objects}
+    own = [each for each in images if isinstance(each, bpy.types.Image) and not each.library and each.is_float]
+    others = {ob.get(IMAGE_PROPERTY) for ob in bpy.data.objects if ob not in set(objects)}
+    return [image for image in own if image not in others]
 
 
-def _own_image(objects):
-    images = {blender_object.get(IMAGE_PROPERTY) for blender_object in objects}
-    images.discard(None)
-    image = images.pop() if len(images) == 1 else None
-    if not isinstance(image, bpy.types.Image) or image.library or not image.is_float or image.channels != 4:
-        return None
-    others = (o for o in bpy.data.objects if o.get(IMAGE_PROPERTY) == image and o not in objects)
-    return image if next(others, None) is None else None
+def _replace(old, image):
+    """Give all that shows the ``old`` image the new one.
+
+    Not by filling the old one anew: undo would give its file back, and leave the pixels that are shown.
+    """
+    name, is_kept = old.name, old.use_fake_user
+    old.user_remap(image)
+    bpy.data.images.remove(old)
+    image.name, image.use_fake_user = name, is_kept

@@ -16,6 +16,8 @@ DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain 
 LEAST_RAYS, MOST_RAYS = 16, 1024  # of a replicate
 PILOT = 4  # of a probe's rays, one in so many tells whether it needs more,
 MORE_RAYS = 16  # times as many, where it is more uncertain than the error aimed at
+FEW, MUCH = 64, 0.25  # one of so many probes that hold this share of the squared error are doubted,
+CERTAIN = 0.25  # and measured as for so many times the error aimed at
 SHADOW, MORE_SHADOW = 4, 16  # times the shadow rays of a receiver, for all and for those that are as uncertain by them
 
 
@@ -29,7 +31,24 @@ def probes_among(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed) -> 
     members, starts, shares = grid.members(chosen_values(grid.value_count))
     measured = measure(job.part(members), error, seed).merged(starts, shares)
     weights = np.add.reduceat(job.weights[members], starts) * (grid.value_count / len(job.receivers))
-    return Probes(members[starts], weights, job.weights[members[starts]] / np.maximum(weights, 1e-30), measured)
+    shares = job.weights[members[starts]] / np.maximum(weights, 1e-30)
+    return Probes(members[starts], weights, shares, measured, np.zeros(len(starts), bool))
+
+
+def doubted_again(probes: Probes, squares, job: GatherJob, grid: TexelGrid | VertexGraph, error, seed) -> Probes:
+    """The probes, the few that hold much of the squared error (K,) measured anew with many more rays.
+
+    One bright ray of a probe looks like an error of the light there, which no pass could mend. Each is doubted once.
+    """
+    few = max(len(squares) // FEW, 1)
+    worst = np.argsort(squares, kind="stable")[-few:]
+    if squares[worst].sum() < MUCH * np.maximum(squares, 0).sum():
+        return probes
+    worst = np.sort(worst[~probes.is_certain[worst]])
+    if not len(worst):
+        return probes
+    members, starts, shares = grid.members(chosen_values(grid.value_count)[worst])
+    return probes.with_certain(worst, measure(job.part(members), CERTAIN * error, seed).merged(starts, shares))
 
 
 def measure(job: GatherJob, error, seed) -> Measured:

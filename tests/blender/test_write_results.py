@@ -134,8 +134,10 @@ def test_textures_keep_their_uv_map(add_cube):
     assert "Lightmap" in layers
 
 
-def test_a_second_bake_replaces_the_first_in_the_same_image(add_cube):
+def test_a_second_bake_takes_the_place_of_the_first(add_cube, nodes):
     cube = add_cube()
+    _, tree = nodes()
+    shown = tree.new("TexImage")
     for seed, size in ((1, (16, 32)), (2, (8, 64))):
         prepared = prepared_for(LIGHTMAP)
         result = result_for(prepared, seed, size)
@@ -144,7 +146,9 @@ def test_a_second_bake_replaces_the_first_in_the_same_image(add_cube):
         np.testing.assert_array_equal(
             stored_uvs(cube)[prepared.targets[0].corners], result.lightmap.uvs[prepared.targets[0].span]
         )
-    assert len(bpy.data.images) == 1
+        shown.image = shown.image or cube["patchlight_lightmap"]
+        assert shown.image == cube["patchlight_lightmap"]
+    assert [image.name for image in bpy.data.images] == ["Patchlight Lightmap"]
     assert len(cube.data.uv_layers) == 1
 
 
@@ -157,6 +161,34 @@ def test_a_bake_of_one_object_leaves_the_lightmap_of_the_other(add_cube):
     write(prepared, result_for(prepared, 2))
     assert first["patchlight_lightmap"] != second["patchlight_lightmap"]
     np.testing.assert_array_equal(stored_pixels(first["patchlight_lightmap"])[..., :3], result.lightmap.pixels)
+
+
+def test_undo_brings_an_earlier_bake_back(add_cube):
+    """Its pixels, too: those of a data-block that stays are not undone."""
+    add_cube()
+    bpy.context.preferences.edit.use_global_undo = True
+    bpy.ops.ed.undo_push(message="built")
+    results = []
+    for seed in (1, 2):
+        prepared = prepared_for(LIGHTMAP)
+        results.append(result_for(prepared, seed))
+        write(prepared, results[-1])
+        bpy.ops.ed.undo_push(message="baked")
+    bpy.ops.ed.undo()
+    image = bpy.data.objects["Cube"]["patchlight_lightmap"]
+    np.testing.assert_array_equal(stored_pixels(image)[..., :3], results[0].lightmap.pixels)
+
+
+def test_what_shows_one_of_several_lightmaps_shows_the_one_of_all(add_cube, nodes):
+    add_cube("A"), add_cube("B")
+    _, tree = nodes()
+    shown = tree.new("TexImage")
+    for chosen in (None, ["B"], None):
+        prepared = prepared_for(LIGHTMAP, object_names=chosen)
+        write(prepared, result_for(prepared, 1))
+        shown.image = shown.image or bpy.data.objects["A"]["patchlight_lightmap"]
+    assert shown.image == bpy.data.objects["A"]["patchlight_lightmap"] == bpy.data.objects["B"]["patchlight_lightmap"]
+    assert [image.name for image in bpy.data.images] == ["Patchlight Lightmap"]
 
 
 def test_vertex_colours_survive_saving(add_cube, tmp_path):
