@@ -14,13 +14,14 @@ from pathlib import Path
 from .cli_bake import DEFAULTS, add_bake
 from .cli_bench import add_bench
 from .core.settings import BakeCancelled, SettingsError, thread_count
-from .in_blender import CommandError, with_blender
+from .in_blender import CommandError, require_apart, with_blender, with_open_stdout
 
 EXIT_ERROR, EXIT_CANCELLED = 1, 130
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command, return its exit code. Expected failures become one line on stderr; bugs keep their traceback."""
+    with_open_stdout()
     args = parser().parse_args(argv)
     try:
         args.run(args)
@@ -108,6 +109,9 @@ def run_demo(args: argparse.Namespace) -> None:
 
 def run_picture(args: argparse.Namespace) -> None:
     """``patchlight picture``: a PNG of a baked .blend in which nothing but the bake gives light."""
+    require_apart("OUT.png", args.output, (args.input, args.lightmap))
+    if args.lightmap:
+        require_apart("--lightmap", args.lightmap, (args.input,))
     with with_blender() as bpy:
         from .blender import files, picture
         from .blender.write_lightmap import lightmap_of
@@ -133,6 +137,8 @@ def run_verify(args: argparse.Namespace) -> None:
     from .core.shipped_cases import shipped_cases
     from .core.workers import Workers
 
+    if args.report:
+        require_apart("--report", args.report, (args.cases,))
     threads = thread_count(args.threads)
     cases = load_cases(args.cases) if args.cases else shipped_cases()
     if args.report:

@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from .core.settings import METHODS, SOLVERS, TARGETS, BakeSettings
-from .in_blender import CommandError, on_ctrl_c, with_blender
+from .in_blender import CommandError, is_stdout_file, on_ctrl_c, require_apart, with_blender
 from .progress import ProgressBar
 
 DEFAULTS = BakeSettings()
@@ -89,11 +89,13 @@ def settings_from(args: argparse.Namespace) -> BakeSettings:
 def run_bake(args: argparse.Namespace) -> None:
     """``patchlight bake``: open, read, bake, write, save; files appear only when all of the bake has succeeded."""
     settings = settings_from(args)
+    if not args.input.name:
+        raise CommandError(f"{args.input}: is a folder, not a .blend file")
     output = args.output or args.input.with_name(f"{args.input.stem}_baked.blend")
     exr = args.exr / f"{output.stem}.exr" if args.exr else None
     _require_sense(args, output, exr)
     seconds: dict[str, float] = {}
-    with with_blender() as bpy, ProgressBar() as progress:
+    with contextlib.ExitStack() as at_last, with_blender() as bpy, ProgressBar() as progress:
         from .blender import bake_scene, files
         from .blender.denoiser_library import denoiser_library
         from .core.bake import bake
@@ -114,12 +116,10 @@ def run_bake(args: argparse.Namespace) -> None:
                 bake_scene.write(prepared, result)
             with _timed(seconds, "save"):
                 files.save_blend(output)
-            report = result.report.with_stages(seconds)
-            if args.report:
-                args.report.write_text(json.dumps(report.as_dict(), indent=2) + "\n")
-            if exr:  # last: what fails here loses nothing else
+            # as soon as stdout is there again, and whatever becomes of the EXR
+            at_last.callback(_report, args, output, result.report.with_stages(seconds))
+            if exr:
                 _save_exr(prepared, exr)
-    _tell(args.input, output, report)
 
 
 def _require_sense(args, output, exr):
@@ -127,8 +127,10 @@ def _require_sense(args, output, exr):
         raise CommandError("--exr writes the lightmap: it needs --target lightmap")
     if args.smooth_angle is not None and args.target != "vertex":
         raise CommandError("--smooth-angle is of vertex colours: it needs --target vertex")
-    if args.report and args.report.resolve() in {path.resolve() for path in (args.input, output, exr) if path}:
-        raise CommandError(f"--report {args.report} is another file of this bake: it needs one of its own")
+    if args.target != "lightmap" and (args.density is not None or args.keep_uvs):
+        raise CommandError("--density and --keep-uvs are of lightmaps: they need --target lightmap")
+    if args.report:
+        require_apart("--report", args.report, (args.input, output, exr))
 
 
 def _require_writable(output, args):
@@ -156,11 +158,17 @@ def _save_exr(prepared, path):
     save_exr(lightmap_of(bpy.data.objects[(target.name, None)] for target in prepared.targets), path)
 
 
-def _tell(source, output, report):
+def _report(args, output, report):
+    """Write it, and tell what a person wants to know; of two things on stdout one would spoil the other."""
+    is_stdout = args.report and is_stdout_file(args.report)
+    if args.report:
+        text = json.dumps(report.as_dict(), indent=2) + "\n"
+        sys.stdout.write(text) if is_stdout else args.report.write_text(text)
     for warning in report.warnings:
         print(f"patchlight: warning: {warning}", file=sys.stderr)
     seconds, error = report.seconds["bake"], report.estimated_error
-    print(f"{source} -> {output}: baked in {seconds:.1f} s, estimated error {error:.3f}")
+    summary = f"{args.input} -> {output}: baked in {seconds:.1f} s, estimated error {error:.3f}"
+    print(summary, file=sys.stderr if is_stdout else sys.stdout)
 
 
 @contextlib.contextmanager

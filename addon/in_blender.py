@@ -22,15 +22,46 @@ class CommandError(Exception):
 def with_blender():
     """Blender's module, silent on stdout (it tells every file that it opens), with Ctrl-C as Python has it."""
     with _silent_stdout():
-        try:
-            import bpy
-        except ModuleNotFoundError as error:
-            if error.name != "bpy":
-                raise
-            raise CommandError(NO_BLENDER) from error
+        cancelled = []
+        # raised while Blender starts, it would end in C code, which goes on or crashes
+        with on_ctrl_c(lambda *_: cancelled.append(True)):
+            bpy = _imported()
+        if cancelled:
+            raise KeyboardInterrupt
         # Blender sets its own handler, which stops nothing of ours
         with on_ctrl_c(signal.default_int_handler):
             yield bpy
+
+
+def _imported():
+    try:
+        import bpy
+    except ModuleNotFoundError as error:
+        if error.name != "bpy":
+            raise
+        raise CommandError(NO_BLENDER) from error
+    return bpy
+
+
+def require_apart(option, path, others) -> None:
+    """CommandError where a file to be written is one of ``others`` (paths or None): it would take that one's place."""
+    if path.resolve() in {other.resolve() for other in others if other}:
+        raise CommandError(f"{option} {path} is another file of this command: it needs one of its own")
+
+
+def is_stdout_file(path) -> bool:
+    """Whether a path is what stdout leads to, as /dev/stdout is."""
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(1))
+    except OSError:
+        return False
+
+
+def with_open_stdout() -> None:
+    """Let stdout lead nowhere where whoever started the command has closed it: files would take its number."""
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w")
+        os.dup2(sys.stdout.fileno(), 1)
 
 
 @contextlib.contextmanager

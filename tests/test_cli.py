@@ -1,5 +1,6 @@
 """The command line: what it takes, what it says when it cannot, what it leaves on disk."""
 
+import contextlib
 import io
 import json
 import os
@@ -11,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from addon import cli
+from addon import cli, in_blender
 from addon.cli_bake import bake_arguments, settings_from
 from addon.progress import ProgressBar, clock_text, line, seconds_left
 
@@ -100,6 +101,8 @@ def test_wrong_usage_is_refused_by_the_parser(words, capsys):
         (["--time-limit", "0"], "time_limit"),
         (["--method", "hemicube", "--solver", "stochastic"], "stochastic"),
         (["--target", "vertex", "--exr", "."], "--exr"),
+        (["--target", "vertex", "--keep-uvs"], "--keep-uvs"),
+        (["--target", "vertex", "--density", "9"], "--density"),
         (["--smooth-angle", "20"], "--smooth-angle"),
     ],
 )
@@ -162,6 +165,22 @@ def test_ctrl_c_during_the_bake_leaves_nothing(room_blend, capsys, monkeypatch):
     monkeypatch.setattr(bake_module, "bake", interrupted_bake)
     before = contents(room_blend.parent)
     assert cli.main(["bake", str(room_blend)]) == 130
+    assert contents(room_blend.parent) == before
+    assert "cancelled" in capsys.readouterr().err
+
+
+def test_ctrl_c_while_blender_starts_is_kept_until_it_has(room_blend, capsys, monkeypatch):
+    """In the middle of C code it would be lost, or worse."""
+    started = []
+
+    def start():
+        os.kill(os.getpid(), signal.SIGINT)
+        started.append(True)
+
+    monkeypatch.setattr(in_blender, "_imported", start)
+    before = contents(room_blend.parent)
+    assert cli.main(["bake", str(room_blend)]) == 130
+    assert started
     assert contents(room_blend.parent) == before
     assert "cancelled" in capsys.readouterr().err
 
@@ -279,6 +298,40 @@ def test_a_result_is_saved_though_its_exr_cannot_be(room_blend, capsys, monkeypa
     assert "No space left" in capsys.readouterr().err
     assert room_blend.with_name("room_baked.blend").exists()
     assert report.exists()
+
+
+@pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="needs a path that leads to stdout")
+@pytest.mark.parametrize("is_file", [True, False])
+def test_a_report_to_stdout_is_all_that_is_there(room_blend, is_file):
+    words = ["bake", str(room_blend), *QUICK, "--report", "/dev/stdout"]
+    command = [sys.executable, "-c", "import sys; from addon import cli; sys.exit(cli.main(sys.argv[1:]))", *words]
+    out = room_blend.parent / "out.json"
+    with out.open("w") if is_file else contextlib.nullcontext(subprocess.PIPE) as stdout:
+        done = subprocess.run(command, stdout=stdout, stderr=subprocess.PIPE, text=True, cwd=ROOT, check=True)
+    assert json.loads(out.read_text() if is_file else done.stdout)["target_error"]
+    assert "baked in" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words", [["room.blend"], ["p.png", "--lightmap", "room.blend"], ["p.png", "--lightmap", "p.png"]]
+)
+def test_a_picture_is_no_other_file_of_its_command(room_blend, capsys, monkeypatch, words):
+    monkeypatch.chdir(room_blend.parent)
+    before = contents(room_blend.parent)
+    fails_with_one_line(capsys, ["picture", "room.blend", *words], "one of its own")
+    assert contents(room_blend.parent) == before
+
+
+@pytest.mark.parametrize("path", [".", "", "/"])
+def test_a_folder_is_no_scene(path, capsys):
+    fails_with_one_line(capsys, ["bake", path])
+
+
+def test_stdout_may_be_closed(room_blend):
+    words = ["bake", str(room_blend), *QUICK]
+    code = "import os, sys; os.close(1); sys.stdout = None; from addon import cli; sys.exit(cli.main(sys.argv[1:]))"
+    subprocess.run([sys.executable, "-c", code, *words], cwd=ROOT, check=True, stderr=subprocess.PIPE)
+    assert "room_baked.blend" in contents(room_blend.parent)
 
 
 def test_a_lightmap_that_is_not_there_is_missed_before_the_render(room_blend, capsys):

@@ -53,3 +53,11 @@ def test_no_file(tmp_path, capsys):
 def test_a_sampled_method(cases, capsys):
     assert cli.main(["verify", cases(entry()), "--method", "monte-carlo", "--seed", "3", "--threads", "1"]) == 0
     assert "monte-carlo" in capsys.readouterr().out
+
+
+def test_the_report_does_not_take_the_place_of_the_cases(tmp_path, capsys):
+    path = tmp_path / "cases.json"
+    path.write_text("[]")
+    assert cli.main(["verify", str(path), "--report", str(path)]) == 1
+    assert "one of its own" in capsys.readouterr().err
+    assert path.read_text() == "[]"

@@ -39,6 +39,7 @@ CORE_ORDER = (
         "gather",
         "backs",
         "lightmap",
+        "findings",
         "bake",
     ),
     *("peak_memory", "bench_row", "bench_cube", "bench_scenes", "bench_peers", "bench_factors", "bench_light", "bench"),

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import shutil
 import tempfile
 from pathlib import Path
 
 import bpy
 
 # Plain, gzip (before 3.0) and Zstandard.
+FULL = 1 << 16  # bytes left, and fewer
 BLEND_STARTS = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
 
@@ -38,6 +40,8 @@ def require_writable(path) -> None:
     path = Path(path)
     if path.is_dir():
         raise FileError(f"{path}: is a folder, not a file")
+    if path.exists() and not path.is_file():  # a device or a pipe
+        return
     folder = path.resolve().parent
     if not folder.is_dir():
         raise FileError(f"{folder}: there is no such folder")
@@ -84,7 +88,9 @@ def _write_whole(path, write):
         write(part)
         os.replace(part, path)
     except (RuntimeError, OSError) as error:
-        raise FileError(f"{path}: cannot be saved ({_reason(error)})") from error
+        # Blender gives whatever reason came last
+        reason = "the disk is full" if shutil.disk_usage(path.parent).free < FULL else _reason(error)
+        raise FileError(f"{path}: cannot be saved ({reason})") from error
     finally:
         part.unlink(missing_ok=True)
 

@@ -176,7 +176,9 @@ class SceneReading:
         colours = {(each.attribute, each.is_alpha) for each in coordinates if isinstance(each, MeshColours)}
         arrays = read_mesh(mesh, {each.uv_layer for each in coordinates if isinstance(each, Coordinates)}, colours)
         if not (are_finite(arrays.positions) and are_finite(matrix)):
-            self.refusals[name] = f"'{name}' has vertices that are not finite (NaN or infinite): it is left out"
+            self.refusals[name] = (
+                f"'{name}' has vertices that are not finite, or as good as endlessly far: it is left out"
+            )
             self.warn(self.refusals[name])
             self.new_meshes.forget(name)
             return

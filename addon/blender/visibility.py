@@ -13,6 +13,7 @@ class Visibility:
 
     def __init__(self, view_layer):
         self._view_layer = view_layer
+        self._present = {each.original.as_pointer() for each in view_layer.depsgraph.objects}
         self._rendered = set()
         self._collect(view_layer.layer_collection)
 
@@ -34,7 +35,7 @@ class Visibility:
         return [
             o.name
             for o in self._view_layer.objects
-            if o.type in RENDERED_TYPES and self._is_shown(o) and not o.visible_get(view_layer=self._view_layer)
+            if o.type in RENDERED_TYPES and self._is_shown(o) and o.as_pointer() not in self._present
         ]
 
     def _is_shown(self, blender_object):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from . import findings
 from .backs import translucent_backs, with_backs
 from .denoiser import open_denoiser
 from .denoising import needs_denoising
@@ -76,12 +77,13 @@ def bake(
         open_denoiser(denoiser_library, settings, progress.poll) as (denoise, no_denoiser),
     ):
         if settings.target == "lightmap":
-            receivers, grid, seen, rects = _on_texels(scene, settings, progress)
+            receivers, grid, seen, rects, found = _on_texels(scene, settings, progress)
             kernel = KernelScene(scene, workers)
             seams = find_seams(scene, kernel, receivers, grid.uvs, grid.receivers, progress.poll)
             grid = replace(grid, seams=seams)
         else:
             progress.begin("texels")
+            found = ()
             kernel = KernelScene(scene, workers)
             receivers, grid = vertex_receivers(scene, kernel, settings.smooth_angle_deg)
             seen = seen_through_corners(scene, grid, settings.seed)
@@ -101,6 +103,7 @@ def bake(
             effort = Effort(settings.error, settings.seed, None, seconds_left, lambda done: progress.poll())
             irradiance = with_backs(irradiance, backs, kernel, solved, effort)
 
+        found += findings.of_light(scene, receivers, irradiance.values)
         progress.begin("texels")
         lightmap = corner_colours = None
         if settings.target == "lightmap":
@@ -113,19 +116,22 @@ def bake(
             corner_colours = sound.spread(corner_colours)
         progress.end()
         denoiser = _denoiser_used(denoise, no_denoiser, irradiance, settings.error)
+    scene = replace(scene, warnings=(*scene.warnings, *found))
     report = _report(scene, settings, progress, solved, irradiance, lightmap, denoiser)
     return BakeResult(lightmap, corner_colours, report)
 
 
 def _on_texels(scene: Scene, settings: BakeSettings, progress: Progress):
-    """A lightmap's receivers, the grid of texels that they are, points at which it is looked up, and objects' rects."""
+    """A lightmap's receivers, the grid of texels that they are, points at which it is looked up, objects' rects, and
+    what the report is to say of it."""
     progress.begin("unwrap")
     charts = unwrap(scene, settings, progress.step)
     progress.begin("texels")
     texel_map = texels(charts)
     receivers = surface_receivers(scene, texel_map.triangles, texel_map.barycentrics)
     grid = texel_grid(scene, charts, texel_map, receivers)
-    return receivers, grid, seen_through_lightmap(scene, grid.receivers, grid.uvs, settings.seed), charts.rects
+    seen = seen_through_lightmap(scene, grid.receivers, grid.uvs, settings.seed)
+    return receivers, grid, seen, charts.rects, findings.of_texels(scene, charts, texel_map, settings.keep_uvs)
 
 
 def _require_targets(sound: SoundFaces) -> None:

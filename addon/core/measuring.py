@@ -36,13 +36,14 @@ def probes_among(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed) -> 
 
 
 def doubted_again(probes: Probes, squares, job: GatherJob, grid: TexelGrid | VertexGraph, error, seed) -> Probes:
-    """The probes, the few that hold much of the squared error (K,) measured anew with many more rays.
+    """The probes, the few that decide about the squared error (K,) measured anew with many more rays.
 
-    One bright ray of a probe looks like an error of the light there, which no pass could mend. Each is doubted once.
+    One bright ray of a probe looks like an error of the light there, which no pass could mend; or it makes the probe so
+    uncertain that more is taken off than there is. Each is doubted once.
     """
-    few = max(len(squares) // FEW, 1)
-    worst = np.argsort(squares, kind="stable")[-few:]
-    if squares[worst].sum() < MUCH * np.maximum(squares, 0).sum():
+    sizes = np.abs(squares)
+    worst = np.argsort(sizes, kind="stable")[-max(len(sizes) // FEW, 1) :]
+    if sizes[worst].sum() < MUCH * sizes.sum():
         return probes
     worst = np.sort(worst[~probes.is_certain[worst]])
     if not len(worst):

@@ -150,9 +150,8 @@ def gather_until(
         scales = _show_what_was_gathered(job, grid, samples, direct.values)
         probes = probes or probes_among(job, grid, error, effort.seed + 1)
         found = _best_estimate(job, grid, samples, scales, direct.values, probes)
-        if found.rms > error:
-            probes = doubted_again(probes, found.squares, job, grid, error, effort.seed + 10)
-            found = replace(found, squares=probes.squares_of(found.values))
+        probes = doubted_again(probes, found.squares, job, grid, error, effort.seed + 10)
+        found = replace(found, squares=probes.squares_of(found.values))
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
             found, aim = _denoised(effort.denoise, job, grid, found, samples, direct, probes), min(aim, AIM)

@@ -345,6 +345,10 @@ class Scene:
 
     def __post_init__(self):
         triangle_count = len(self.triangles)
+        for name in ("vertices", "triangles", "corner_normals", "uvs", "triangle_materials"):
+            array = getattr(self, name)
+            if isinstance(array, np.ndarray):  # a view in other strides, which the kernel does not take
+                object.__setattr__(self, name, np.ascontiguousarray(array))
         _require_rows("vertices", self.vertices, np.float64, (len(self.vertices), 3))
         _require_rows("triangles", self.triangles, np.int32, (triangle_count, 3))
         _require_rows("corner_normals", self.corner_normals, np.float32, (triangle_count, 3, 3))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import numbers
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 TARGETS = ("lightmap", "vertex")
 METHODS = ("auto", "hemicube", "monte-carlo")
@@ -57,6 +58,8 @@ class BakeSettings:
     threads: int = 0
 
     def __post_init__(self):
+        for field in fields(self):
+            _require_type(field, getattr(self, field.name))
         _require_choice("target", self.target, TARGETS)
         _require_choice("method", self.method, METHODS)
         _require_choice("solver", self.solver, SOLVERS)
@@ -86,6 +89,23 @@ def thread_count(threads: int) -> int:
 def require_threads(threads: int) -> None:
     """SettingsError where nobody could run so many."""
     _require("threads", threads, 0 <= threads <= 1024, "0 ... 1024")
+
+
+KINDS = {
+    "str": (str, "a word"),
+    "bool": (bool, "True or False"),
+    "int": (numbers.Integral, "a whole number"),
+    "float": (numbers.Real, "a number"),
+}
+
+
+def _require_type(field, value):
+    kind, _, none = field.type.partition(" | ")
+    expected, called = KINDS[kind]
+    is_none = none and value is None
+    is_number = expected not in (str, bool) and isinstance(value, bool)  # which Python takes for one
+    if not is_none and (not isinstance(value, expected) or is_number):
+        raise SettingsError(f"{field.name} is {value!r}: allowed is {called}{' or None' if none else ''}")
 
 
 def _require(name, value, holds, allowed):

@@ -148,12 +148,17 @@ def _edge_warnings(names, count):
     """One for all objects: they may be many, as whole scenes are shaded smooth by a click."""
     if not names:
         return []
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
     return [
-        f"{'object' if len(names) == 1 else 'objects'} {', '.join(names[:MOST_NAMES])}{more}: {count} triangles have "
+        f"{named(names)}: {count} triangles have "
         f"shading normals more than {STEEPEST:g} degrees off a face, as over sharp edges: they are baked with those of "
         "the faces around them, without such edges"
     ]
+
+
+def named(names) -> str:
+    """Objects as the report calls them in one sentence."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return f"object{'s' if len(names) > 1 else ''} {', '.join(names[:MOST_NAMES])}{more}"
 
 
 def _attribute_warning(obj, what, is_bad):

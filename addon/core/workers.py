@@ -45,7 +45,7 @@ class Progress:
             return
         before = sum(self._shares[name] for name in self.seconds if name in self._shares)
         whole = before + self._shares.get(self._stage, 0.0) * min(max(done, 0.0), 1.0)
-        if not self._on_progress(self._stage, min(whole, 1.0)):
+        if self._on_progress(self._stage, min(whole, 1.0)) is False:
             raise BakeCancelled("the bake was cancelled")
 
     def poll(self) -> None:

@@ -10,6 +10,11 @@ from ..core.settings import BakeSettings
 DEFAULTS = BakeSettings()
 
 
+def _as_shown(number: float) -> float:
+    """What a person has set: properties keep 32 bits, in which 180 degrees are more than 180."""
+    return float(f"{number:.6g}")
+
+
 class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
     """Bake options of a scene; saved in the .blend."""
 
@@ -154,13 +159,13 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
             target=self.target,
             method=self.method,
             solver=self.solver,
-            error=self.error,
-            time_limit=self.time_limit if self.use_time_limit else None,
+            error=_as_shown(self.error),
+            time_limit=_as_shown(self.time_limit) if self.use_time_limit else None,
             texels=self.size * self.size,
-            density=self.density * metres_per_unit if by_density else None,
+            density=_as_shown(self.density) * metres_per_unit if by_density else None,
             keep_uvs=self.target == "lightmap" and self.keep_uvs,
-            patch_size=self.patch_size if self.use_patch_size else None,
-            smooth_angle_deg=degrees(self.smooth_angle),
+            patch_size=_as_shown(self.patch_size) if self.use_patch_size else None,
+            smooth_angle_deg=_as_shown(degrees(self.smooth_angle)),
             denoise=self.denoise,
             seed=self.seed,
             threads=self.threads,
@@ -169,7 +174,7 @@ class PATCHLIGHT_PG_settings(bpy.types.PropertyGroup):
     @property
     def edge_length(self) -> float | None:
         """What to cut faces to [m], None to leave them."""
-        return self.subdivide if self.target == "vertex" and self.use_subdivide else None
+        return _as_shown(self.subdivide) if self.target == "vertex" and self.use_subdivide else None
 
 
 class PATCHLIGHT_PG_state(bpy.types.PropertyGroup):
