@@ -16,8 +16,6 @@ DOUBT = 3.0  # times the error aimed at, squared: what a probe may be uncertain 
 LEAST_RAYS, MOST_RAYS = 16, 1024  # of a replicate
 PILOT = 4  # of a probe's rays, one in so many tells whether it needs more,
 MORE_RAYS = 16  # times as many, where it is more uncertain than the error aimed at
-FEW, MUCH = 64, 0.25  # one of so many probes that hold this share of the squared error are doubted,
-CERTAIN = 0.25  # and measured as for so many times the error aimed at
 SHADOW, MORE_SHADOW = 4, 16  # times the shadow rays of a receiver, for all and for those that are as uncertain by them
 
 
@@ -31,25 +29,7 @@ def probes_among(job: GatherJob, grid: TexelGrid | VertexGraph, error, seed) -> 
     members, starts, shares = grid.members(chosen_values(grid.value_count))
     measured = measure(job.part(members), error, seed).merged(starts, shares)
     weights = np.add.reduceat(job.weights[members], starts) * (grid.value_count / len(job.receivers))
-    shares = job.weights[members[starts]] / np.maximum(weights, 1e-30)
-    return Probes(members[starts], weights, shares, measured, np.zeros(len(starts), bool))
-
-
-def doubted_again(probes: Probes, squares, job: GatherJob, grid: TexelGrid | VertexGraph, error, seed) -> Probes:
-    """The probes, the few that decide about the squared error (K,) measured anew with many more rays.
-
-    One bright ray of a probe looks like an error of the light there, which no pass could mend; or it makes the probe so
-    uncertain that more is taken off than there is. Each is doubted once.
-    """
-    sizes = np.abs(squares)
-    worst = np.argsort(sizes, kind="stable")[-max(len(sizes) // FEW, 1) :]
-    if sizes[worst].sum() < MUCH * sizes.sum():
-        return probes
-    worst = np.sort(worst[~probes.is_certain[worst]])
-    if not len(worst):
-        return probes
-    members, starts, shares = grid.members(chosen_values(grid.value_count)[worst])
-    return probes.with_certain(worst, measure(job.part(members), CERTAIN * error, seed).merged(starts, shares))
+    return Probes(members[starts], weights, job.weights[members[starts]] / np.maximum(weights, 1e-30), measured)
 
 
 def measure(job: GatherJob, error, seed) -> Measured:

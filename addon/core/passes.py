@@ -14,7 +14,7 @@ from .direct_light import DirectLight
 from .effort import Effort
 from .gather_job import REPLICATES, GatherJob
 from .gather_sums import no_sums
-from .measuring import doubted_again, probes_among
+from .measuring import probes_among
 from .probes import Probes, rms_of
 from .relative import scale_of
 from .smoothing import TexelGrid
@@ -150,8 +150,6 @@ def gather_until(
         scales = _show_what_was_gathered(job, grid, samples, direct.values)
         probes = probes or probes_among(job, grid, error, effort.seed + 1)
         found = _best_estimate(job, grid, samples, scales, direct.values, probes)
-        probes = doubted_again(probes, found.squares, job, grid, error, effort.seed + 10)
-        found = replace(found, squares=probes.squares_of(found.values))
         is_asked = error < found.rms <= DENOISE * error
         if is_asked:
             found, aim = _denoised(effort.denoise, job, grid, found, samples, direct, probes), min(aim, AIM)

@@ -8,7 +8,7 @@ artist sees, texel size and all.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -75,23 +75,12 @@ class Probes:
     weights : (K,) of their squared errors
     shares : (K,) of these, what is the one receiver's weight: 1 where each value has one
     measured : what light they have
-    is_certain : (K,) those that were measured twice
     """
 
     receivers: np.ndarray
     weights: np.ndarray
     shares: np.ndarray
     measured: Measured
-    is_certain: np.ndarray
-
-    def with_certain(self, chosen, again: Measured) -> Probes:
-        """With what was measured ``again`` at some of them (M,), in place of what was."""
-        luminance, variance, is_certain = (
-            np.copy(x) for x in (self.measured.luminance, self.measured.variance, self.is_certain)
-        )
-        luminance[chosen], variance[chosen], is_certain[chosen] = again.luminance, again.variance, True
-        measured = Measured(luminance, variance, self.measured.rays + again.rays)
-        return replace(self, measured=measured, is_certain=is_certain)
 
     def squares_of(self, values):
         """Squared relative errors (K,) of all receivers' irradiance (N, 3), weighted."""

@@ -82,7 +82,7 @@ def as_they_are(values):
 def probes_of(luminance, receivers):
     """Probes at receivers (K,) that found luminance (K,), for certain."""
     ones = np.ones(len(receivers))
-    return Probes(receivers, ones, ones, Measured(luminance, 0 * ones, 0), ones > 1)
+    return Probes(receivers, ones, ones, Measured(luminance, 0 * ones, 0))
 
 
 def test_two_estimates_are_mixed_where_the_probes_find_each_better():
