@@ -130,7 +130,7 @@ def _principled(tree, node, light, is_traced):
     def clear():
         return traced_glass(tree, node) if is_traced else _transparent(tree, base)
 
-    # the reader of materials draws the same line: light passes from a transmission of 0.5 on
+    # a pixel is a mirror image or none: glass from a transmission of 0.5 on
     reflected = chosen(tree, node.inputs["Transmission Weight"], solid, clear)
     emitted = tree.nodes.new("ShaderNodeEmission")
     feed(tree, node.inputs["Emission Color"], emitted.inputs["Color"])
