@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from addon.core.emitters import emitters_of
-from addon.core.patch_solution import LIGHT
+from addon.core.kernel import LIGHT_SIDE
 from addon.core.radiosity import solve_radiosity
 from addon.core.scene import AreaLight, Material, PointLight, SceneError, SunLight
 from addon.core.settings import BakeSettings
@@ -92,7 +92,7 @@ def test_bright_sides_are_no_lights_where_the_two_kinds_of_rays_differ(is_unhidi
     with kernel_of(scene, 2) as kernel:
         emitters = emitters_of(scene, kernel.centre)
         solved = solve_radiosity(scene, kernel, emitters, BakeSettings(error=0.02), lambda done: None)
-    assert (solved.patches.kinds == LIGHT).any() != is_unhiding
+    assert (solved.patches.kinds == LIGHT_SIDE).any() != is_unhiding
 
 
 def test_a_surface_that_nobody_sees_must_not_shine():
