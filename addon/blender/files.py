@@ -9,8 +9,8 @@ from pathlib import Path
 
 import bpy
 
+FULL = 1 << 16  # bytes left on a disk, and fewer
 # Plain, gzip (before 3.0) and Zstandard.
-FULL = 1 << 16  # bytes left, and fewer
 BLEND_STARTS = (b"BLENDER", b"\x1f\x8b", b"\x28\xb5\x2f\xfd")
 
 

@@ -20,9 +20,8 @@ def _divided(a, b):
 
 def _power(a, b):
     """0 of what is below 0, but for whole exponents."""
-    return np.where((a >= 0) | (b == np.rint(b)), np.power(np.where(a >= 0, a, np.abs(a)), b), 0) * np.where(
-        (a < 0) & (b % 2 != 0), -1, 1
-    )
+    sign = np.where((a < 0) & (b % 2 != 0), -1, 1)
+    return np.where((a >= 0) | (b == np.rint(b)), sign * np.power(np.abs(a), b), 0)
 
 
 def _wrapped(a, most, least):

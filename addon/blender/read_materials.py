@@ -221,9 +221,11 @@ class MaterialReading:
         return weighted_sum([(weight, self._shader(reached)) for weight, reached in parts if not weight.is_black])
 
     def _principled(self, reached) -> Surface:
-        coat = self._coat(reached)
-        base = self._colour(reached, "Base Color").within(1.0).times(coat)
-        if not self._amount(reached, "Metallic").is_black:
+        base = self._colour(reached, "Base Color").within(1.0)
+        coat = self._coat(reached)  # after the colour, whose image says where textures lie
+        base = base.times(coat)
+        metallic = reached.feeding("Metallic")
+        if not metallic.is_constant or constant(metallic) > 0:  # how much of it is metal no map need be read for
             self.say("its metal is baked as diffuse")
         passing = pointwise(lambda share: np.clip(share, 0, 1), self._amount(reached, "Transmission Weight"))
         radiance = self._emitted(reached, "Emission Color", "Emission Strength").times(coat)
@@ -236,10 +238,10 @@ class MaterialReading:
     def _coat(self, reached) -> Colour:
         """What a tinted coat lets through, 1 where there is none: Cycles takes its tint to the power of the way
         through it, once."""
-        weight = self._amount(reached, "Coat Weight")
-        if weight.is_black or "Coat Tint" not in reached.node.inputs:
-            return ALL
         tint = self._colour(reached, "Coat Tint").within(1.0)
+        weight = ALL if tint.is_white else self._amount(reached, "Coat Weight")
+        if tint.is_white or weight.is_black:
+            return ALL
         return pointwise(lambda share, t: 1 + np.clip(share, 0, 1) * (t**COAT_DEPTH - 1), weight, tint)
 
     def _below_sheen(self, reached, surface: Surface) -> Surface:

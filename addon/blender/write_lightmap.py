@@ -98,7 +98,8 @@ def _own_images(objects):
     """Lightmaps of earlier bakes that only these objects point to."""
     images = {ob.get(IMAGE_PROPERTY): None for ob in objects}
     own = [each for each in images if isinstance(each, bpy.types.Image) and not each.library and each.is_float]
-    others = {ob.get(IMAGE_PROPERTY) for ob in bpy.data.objects if ob not in set(objects)}
+    targets = set(objects)
+    others = {ob.get(IMAGE_PROPERTY) for ob in bpy.data.objects if ob not in targets}
     return [image for image in own if image not in others]
 
 

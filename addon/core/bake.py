@@ -116,8 +116,7 @@ def bake(
             corner_colours = sound.spread(corner_colours)
         progress.end()
         denoiser = _denoiser_used(denoise, no_denoiser, irradiance, settings.error)
-    scene = replace(scene, warnings=(*scene.warnings, *found))
-    report = _report(scene, settings, progress, solved, irradiance, lightmap, denoiser)
+    report = _report(scene, found, settings, progress, solved, irradiance, lightmap, denoiser)
     return BakeResult(lightmap, corner_colours, report)
 
 
@@ -151,8 +150,8 @@ def _denoiser_used(denoise, reason, irradiance, error) -> str:
     return f"none: {reason or denoise.failure or why_not}"
 
 
-def _report(scene, settings, progress, solved: Solved, irradiance: Irradiance, lightmap, denoiser) -> Report:
-    warnings = list(scene.warnings)
+def _report(scene, found, settings, progress, solved: Solved, irradiance: Irradiance, lightmap, denoiser) -> Report:
+    warnings = [*scene.warnings, *found]
     if not irradiance.target_reached:
         warnings.append(
             f"the target error {settings.error:g} was not reached: sampling stopped at an estimated "

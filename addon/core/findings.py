@@ -13,7 +13,7 @@ from .triangles import triangle_areas
 
 MOST_SHARE, FEW_TEXELS = 0.9, 64  # of the texels that one object may take while most others have no more than so few
 LEAST_OWNED = 0.8  # of the texels that an object's UVs cover: it has more, along the rims of charts, where none overlap
-FLAT = 1e-6  # texels, the area in UVs of a triangle that has none,
+FLAT = 1e-6  # square texels, the area in UVs of a triangle that has none,
 MOST_FLAT = 0.01  # and the share of an object's surface that such may have
 
 
@@ -54,11 +54,11 @@ def _crowded_out(targets, owned):
 
 
 def _unfit_uvs(scene, charts, targets, owned):
-    overlapping, flat = [], []
+    overlapping, flat, surfaces = [], [], triangle_areas(scene.corners)
     for obj, texels in zip(targets, owned):
         uvs = charts.uvs[obj.span].astype(np.float64)
         covered = triangle_areas(np.pad(uvs, ((0, 0), (0, 0), (0, 1))))
-        surface = triangle_areas(scene.corners[obj.span])
+        surface = surfaces[obj.span]
         if texels < LEAST_OWNED * covered.sum():
             overlapping.append(obj.name)
         if surface[covered <= FLAT].sum() > MOST_FLAT * surface.sum():

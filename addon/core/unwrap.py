@@ -60,7 +60,8 @@ def _kept(scene, settings):
 
 def _side(scene, targets, uvs, settings):
     """Texels along a square in which the targets' UVs (N, 3, 2) have all of their surface's texels at a density."""
-    area = sum(float(triangle_areas(scene.corners[obj.span]).sum()) for obj in targets)
+    areas = triangle_areas(scene.corners)
+    area = sum(float(areas[obj.span].sum()) for obj in targets)
     share = sum(float(triangle_areas(np.pad(kept, ((0, 0), (0, 0), (0, 1)))).sum()) for kept in uvs)
     if not share > 0:
         raise SceneError('the UV layers "Lightmap" have no area: a density gives no size')

@@ -290,6 +290,8 @@ typedef struct pl_solution {
     size_t sky_side;
 } pl_solution;
 
+enum { PL_MANY_LIGHTS = 64 };
+
 /*
  * The light on a lightmap's own texels, once it is about known: finer than any patch.
  *
@@ -304,7 +306,6 @@ typedef struct pl_solution {
  * Where a ray goes on, it samples the lights if there are fewer than PL_MANY_LIGHTS; of more the shadow of any one
  * matters little, and looking at all of them costs more than the ray: it takes what the patch has of them.
  */
-enum { PL_MANY_LIGHTS = 64 };
 typedef struct pl_texel_light {
     const float *uvs;
     const uint64_t *light;
