@@ -13,6 +13,7 @@ else:
     import bpy
 
     from addon.blender.read_scene import read_scene
+    from tests.blender.node_trees import ROUNDING, baked_by_cycles, colours, image_node
 
 
 @pytest.fixture
@@ -133,3 +134,35 @@ def read_material(add_cube):
         return scene.materials[scene.triangle_materials[0]], scene.warnings
 
     return read
+
+
+@pytest.fixture
+def plane(add_mesh):
+    """A unit square whose UVs are its x and y."""
+    plane = add_mesh("Plane", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
+    plane.data.uv_layers.new(name="UVMap").uv.foreach_set("vector", [0, 0, 1, 0, 1, 1, 0, 1])
+    return plane
+
+
+@pytest.fixture
+def compare(nodes, add_image, plane):
+    """Hold the reading of ``make(tree, first image's node, second one's)``, a node, against Cycles' bake."""
+
+    def check(make, socket=0, tolerance=ROUNDING, is_flat=False):
+        material, tree = nodes()
+        images = [image_node(tree, add_image(colours(k), is_float=True, space="Non-Color")) for k in (0, 1)]
+        diffuse = tree.new("BsdfDiffuse")
+        tree.link(make(tree, *images), diffuse, socket, "Color")
+        tree.show(diffuse)
+        plane.data.materials.append(material)
+        scene = read_scene(bpy.context.scene)
+        assert scene.warnings == ()
+        found = scene.materials[scene.triangle_materials[0]]
+        read = np.array(found.reflectance)
+        if found.reflectance_texture is not None:
+            read = read * found.reflectance_texture.pixels
+        expected = np.clip(baked_by_cycles(plane, material), 0, 1)
+        np.testing.assert_allclose(np.broadcast_to(read, expected.shape), expected, atol=tolerance)
+        assert (np.ptp(expected) > 0.1) != is_flat
+
+    return check

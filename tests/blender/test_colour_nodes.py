@@ -7,77 +7,21 @@ import numpy as np
 import pytest
 
 from addon.blender.colour_nodes import blackbody
-from addon.blender.number_nodes import MATH, VECTORS
 from addon.blender.private_render import RenderError
 from addon.blender.read_scene import read_scene
+from tests.blender.node_trees import (
+    LUMINANCE,
+    ROUNDING,
+    SIDE,
+    TABLES,
+    arithmetic,
+    baked_by_cycles,
+    colours,
+    halved,
+    image_node,
+)
 
 pytestmark = pytest.mark.usefixtures("empty_file")
-
-SIDE = 8
-TABLES = 2e-3  # Cycles looks ramps and curves up in tables of 256 entries, in 32 bits
-ROUNDING = 2e-5  # chains of 32-bit numbers of about 1
-LUMINANCE = 1.5e-4  # Blender's weights of luminance have seven digits, ours the four of Rec.709: 7e-5, and powers of it
-
-
-def colours(seed):
-    """An image (SIDE, SIDE, 3) that has black, white and a grey in it."""
-    pixels = np.random.default_rng(seed).random((SIDE, SIDE, 3)).astype(np.float32)
-    pixels[0, :3] = [[0, 0, 0], [1, 1, 1], [0.5, 0.5, 0.5]]
-    return pixels
-
-
-@pytest.fixture
-def plane(add_mesh):
-    """A unit square whose UVs are its x and y."""
-    plane = add_mesh("Plane", [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
-    plane.data.uv_layers.new(name="UVMap").uv.foreach_set("vector", [0, 0, 1, 0, 1, 1, 0, 1])
-    return plane
-
-
-def baked_by_cycles(plane, material):
-    """Pixels (SIDE, SIDE, 3) of Cycles' bake of the base colour: at texel centres, where lookups do not interpolate."""
-    image = bpy.data.images.new("Baked", SIDE, SIDE, float_buffer=True)
-    image.colorspace_settings.name = "Non-Color"
-    node = material.node_tree.nodes.new("ShaderNodeTexImage")
-    node.image = image
-    material.node_tree.nodes.active = node
-    bpy.context.scene.render.engine = "CYCLES"
-    bpy.context.scene.cycles.samples = 1
-    bpy.context.view_layer.objects.active = plane
-    plane.select_set(True)
-    bpy.ops.object.bake(type="DIFFUSE", pass_filter={"COLOR"}, margin=0)
-    return np.array(image.pixels[:]).reshape(SIDE, SIDE, 4)[..., :3]
-
-
-def image_node(tree, image):
-    node = tree.new("TexImage")
-    node.image, node.interpolation = image, "Closest"
-    return node
-
-
-@pytest.fixture
-def compare(nodes, add_image, plane):
-    """Hold the reading of ``make(tree, first image's node, second one's)``, a node, against Cycles' bake."""
-
-    def check(make, socket=0, tolerance=ROUNDING, is_flat=False):
-        material, tree = nodes()
-        images = [image_node(tree, add_image(colours(k), is_float=True, space="Non-Color")) for k in (0, 1)]
-        diffuse = tree.new("BsdfDiffuse")
-        tree.link(make(tree, *images), diffuse, socket, "Color")
-        tree.show(diffuse)
-        plane.data.materials.append(material)
-        scene = read_scene(bpy.context.scene)
-        assert scene.warnings == ()
-        found = scene.materials[scene.triangle_materials[0]]
-        read = np.array(found.reflectance)
-        if found.reflectance_texture is not None:
-            read = read * found.reflectance_texture.pixels
-        expected = np.clip(baked_by_cycles(plane, material), 0, 1)
-        np.testing.assert_allclose(np.broadcast_to(read, expected.shape), expected, atol=tolerance)
-        assert (np.ptp(expected) > 0.1) != is_flat
-
-    return check
-
 
 BLENDS = ["MIX", "ADD", "SUBTRACT", "MULTIPLY", "DIVIDE", "SCREEN", "OVERLAY", "SOFT_LIGHT", "LINEAR_LIGHT"]
 BLENDS += ["DIFFERENCE", "EXCLUSION", "DARKEN", "LIGHTEN"]
@@ -93,14 +37,6 @@ def test_a_mix_of_two_images(compare, blend):
         return tree.link(second, node, "Color", 7)
 
     compare(mix, socket=2)
-
-
-def halved(tree, node, socket=0):
-    """Half of what a node puts out: what lies above 1 shows, and whether it was clamped."""
-    half = tree.new("MixRGB")
-    half.blend_type = "MULTIPLY"
-    half.inputs[0].default_value, half.inputs[2].default_value = 1.0, (0.5, 0.5, 0.5, 1.0)
-    return tree.link(node, half, socket, 1)
 
 
 @pytest.mark.parametrize("is_clamped", [True, False])
@@ -183,121 +119,6 @@ def test_what_changes_a_colour(compare, kind, numbers, at):
         return tree.link(first, node, "Color", at)
 
     compare(node_of, tolerance=LUMINANCE if kind == "RGBToBW" else ROUNDING)
-
-
-def arithmetic(tree, operation, number, source, socket=0, is_clamped=False):
-    node = tree.new("Math")
-    node.operation, node.use_clamp = operation, is_clamped
-    node.inputs[1].default_value = number
-    return tree.link(source, node, socket, 0)
-
-
-@pytest.mark.parametrize("is_clamped", [True, False])
-@pytest.mark.parametrize("operation", ["ADD", "SUBTRACT", "MULTIPLY", "MINIMUM", "MAXIMUM", "DIVIDE", "POWER"])
-def test_arithmetic(compare, operation, is_clamped):
-    def node_of(tree, first, second):
-        return halved(tree, arithmetic(tree, operation, 0.6, first, "Color", is_clamped))
-
-    compare(node_of, tolerance=LUMINANCE)
-
-
-def channel(tree, source, name="Green"):
-    """One channel, to the bit: steps would turn luminance's rounding into a difference of 1."""
-    return tree.link(source, tree.new("SeparateColor"), "Color", 0), name
-
-
-@pytest.mark.parametrize("operation", sorted(set(MATH) - {"POWER", "DIVIDE"}))
-def test_every_operation_on_numbers(compare, operation):
-    """Of a channel from -1 to 1, with numbers that none of its values is a multiple of."""
-
-    def node_of(tree, first, second):
-        parts, name = channel(tree, first)
-        wide = arithmetic(tree, "SUBTRACT", 1.0, arithmetic(tree, "MULTIPLY", 2.0, parts, name))
-        node = arithmetic(tree, operation, -0.57 if operation == "WRAP" else 0.37, wide)
-        node.inputs[2].default_value = 0.21
-        return halved(tree, arithmetic(tree, "ADD", 1.0, node))
-
-    compare(node_of, tolerance=10 * ROUNDING)  # differences of numbers of about 1 over .37
-
-
-def test_whole_powers_of_numbers_below_zero(compare):
-    def node_of(tree, first, second):
-        parts, name = channel(tree, first)
-        below = arithmetic(tree, "SUBTRACT", 1.0, parts, name)
-        return arithmetic(tree, "ADD", 1.0, arithmetic(tree, "POWER", 3.0, below))
-
-    compare(node_of)
-
-
-@pytest.mark.parametrize("operation", sorted(VECTORS))
-def test_every_operation_on_vectors(compare, operation):
-    def node_of(tree, first, second):
-        node = tree.link(tree.link(first, tree.new("VectorMath"), "Color", 0), tree.new("VectorMath"), 0, 0)
-        node.operation = operation
-        for place, values in ((1, (0.37, 0.41, 0.53)), (2, (0.23, 0.29, 0.19))):
-            node.inputs[place].default_value = values
-        return halved(tree, node)
-
-    compare(node_of, tolerance=10 * ROUNDING)
-
-
-def test_a_scaled_vector_as_a_number(compare):
-    """Of a vector a number takes the mean, and no luminance."""
-
-    def node_of(tree, first, second):
-        scaled = tree.link(first, tree.new("VectorMath"), "Color", 0)
-        scaled.operation = "SCALE"
-        scaled.inputs["Scale"].default_value = 0.7
-        return arithmetic(tree, "ADD", 0.1, scaled)
-
-    compare(node_of)
-
-
-@pytest.mark.parametrize("mode", ["RGB", "HSV"])
-def test_channels_apart_and_together_again(compare, mode):
-    def node_of(tree, first, second):
-        apart, together = tree.new("SeparateColor"), tree.new("CombineColor")
-        apart.mode = together.mode = mode
-        tree.link(first, apart, "Color", 0)
-        for one, other in ((0, 2), (1, 1), (2, 0)):
-            tree.link(apart, together, one, other)
-        return together
-
-    compare(node_of, tolerance=10 * ROUNDING)  # a hue is a difference over a spread
-
-
-@pytest.mark.parametrize("is_clamped", [True, False])
-def test_a_range_mapped_to_another(compare, is_clamped):
-    def node_of(tree, first, second):
-        parts, name = channel(tree, first)
-        node = tree.new("MapRange")
-        node.clamp = is_clamped
-        for place, value in enumerate((0.2, 0.7, 0.9, 0.3), 1):
-            node.inputs[place].default_value = value
-        return tree.link(parts, node, name, 0)
-
-    compare(node_of)
-
-
-@pytest.mark.parametrize("kind", ["MINMAX", "RANGE"])
-def test_a_number_is_clamped(compare, kind):
-    def node_of(tree, first, second):
-        parts, name = channel(tree, first)
-        node = tree.new("Clamp")
-        node.clamp_type = kind
-        node.inputs[1].default_value, node.inputs[2].default_value = 0.3, 0.6
-        if kind == "RANGE":
-            node.inputs[1].default_value, node.inputs[2].default_value = 0.6, 0.3
-        return tree.link(parts, node, name, 0)
-
-    compare(node_of)
-
-
-def test_numbers_below_zero_count_until_the_end(compare):
-    def one_less_it(tree, first, second):
-        return arithmetic(tree, "ADD", 1.0, arithmetic(tree, "MULTIPLY", -1.0, first, "Color"))
-
-    compare(one_less_it, tolerance=LUMINANCE)
 
 
 def test_curves_go_on_beyond_one(compare):
